@@ -33,7 +33,7 @@ GENERATIONS, WORK = 120, 250  # of it at most; of it times the corners of a spre
 SIZES = (0.2, 0.07, 0.2, 0.07)  # of the first simplex of each start, share of the box
 WIDER, WIDENED = (0.4, 0.7), 0.1  # shares of the spread on the way to it, and the first simplex at each
 SIMPLEX = 150  # evaluations of one
-COSTLY = 64  # controllers that are computed: of the look, and of each simplex
+COSTLY, COSTLY_STARTS = 64, 4  # of controllers that are computed: of each simplex, and how many there are
 UNSTABLE = -10.0  # ln ratio of an unstable loop, less its growth
 ROUNDING = 1e-9  # of a pole on the unit circle: an integrator that the loop does not see
 HALF = (0.15, 0.3, 0.5, 0.75, 1.0, 1.35, 1.8, 2.4, 3.2, 4.5, 6.5, 10.0, 16.0, 27.0, 45.0)
@@ -233,11 +233,16 @@ def _computed(problem: TuningProblem) -> Array:
 
     low, high = problem.box.T
     corners = problem.of(problem.corners)
-    spread = low + qmc.Sobol(len(low), scramble=True, seed=1).random(COSTLY) * (high - low)
-    worst = np.array([corners.worst(x) for x in spread])
-    ends = [simplex_from(corners, spread[k], 0.15, COSTLY) for k in np.argsort(-worst)[:2]]
-    best = polished(corners, max(ends, key=corners.worst), 8)
-    problem.evaluations += corners.evaluations
+    spread = low + qmc.Sobol(len(low), scramble=True, seed=1).random(LOOK // 2) * (high - low)
+    first = spread[np.argsort([-corners.worst(x) for x in spread])[:COSTLY_STARTS]]
+
+    def end(k: int) -> tuple[Array, int]:
+        own = problem.of(problem.corners)
+        return simplex_from(own, first[k], 0.15, COSTLY), own.evaluations
+
+    ends = each(end, len(first), long=True)
+    best = polished(corners, max((x for x, _ in ends), key=corners.worst), 8)
+    problem.evaluations += corners.evaluations + sum(judged for _, judged in ends)
     return best
 
 

@@ -61,10 +61,11 @@ def _alone(problem: TuningProblem, x: Array, result: WishResult) -> str:
     one = replace(problem, wishes=[result.wish], box=decades).of(len(problem.plants))
     one.f = frequencies(one.plants, decades, one.wishes)
     best = max(result.ratio, float(np.exp(one.worst(polished(one, descended(one.of(one.corners), x))))))
+    if best > 99.0:
+        return f"{result.wish.name} alone: 100 times what is wanted, or more"
     value = result.wish.value * best if result.wish.least else result.wish.value / best
-    much = "100 times what is wanted, or more" if best > 99.0 else result.wish.shown(value)
     beyond = "" if best >= 1.0 else f"no {'more' if result.wish.least else 'less'} than "
-    return f"{result.wish.name} alone: {beyond}{much} was found"
+    return f"{result.wish.name} alone: {beyond}{result.wish.shown(value)} was found"
 
 
 def _jitter(problem: TuningProblem, x: Array, k: int, wanted: Sequence[WishResult]) -> list[str]:
