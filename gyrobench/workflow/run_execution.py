@@ -29,6 +29,8 @@ from gyrobench.workflow.user_errors import CommandInterrupted, PostRunError, rec
 if TYPE_CHECKING:
     from gyrobench.engine.session import Session
 
+OTHER = 10.0  # times a measure: a change by the double step that is no effect of its first order
+
 
 @dataclass(frozen=True)
 class RunRequest:
@@ -201,7 +203,7 @@ def check_step(
     """Return what the step does to each coefficient, from two runs with the noise off; see reduction.step_effect.
 
     The second run has half the step.  short: twice the step, in a quarter of the time, and the shortest holds that the
-    system takes; half the step where the parts refuse the double one or have no figures there.
+    system takes; half the step where the parts refuse the double one, have no figures there, or others (a loop hunts).
     """
     import time
 
@@ -231,7 +233,8 @@ def check_step(
         except GyrobenchError:
             if not short:
                 raise
-        if not rows:
+        sizes = {c.name: abs(c.estimate) for c in at_step}
+        if not rows or any(r.unit != "dB" and abs(r.change) > OTHER * sizes[r.name] > 0.0 for r in rows) and short:
             factor = 0.5
             rows = step_effects(at_step, coefficients(factor * step), factor)
     return StepCheck(step, rows, factor * step, time.perf_counter() - start)

@@ -246,6 +246,7 @@ def test_sharp_modes_of_a_spread_stand_on_frequencies() -> None:
     assert [np.abs(p.response(f)).max() for p in found] == pytest.approx([500.0, 500.0], rel=1e-3)
 
 
+@pytest.mark.long
 def test_what_a_wish_alone_gives_holds_over_the_spread() -> None:
     """A plant with 40 times the gain is in the spread: what is best at nominal values alone is unstable with it."""
     one = problem("pi+lead", ["bandwidth>2Hz"])
