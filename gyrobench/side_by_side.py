@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import current_process, get_all_start_methods, get_context
 from typing import Any, TypeVar
 
 T = TypeVar("T")
+#: of the environment: threads of the linear algebra.  On matrices as small as these they cost more than they give
+ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 _task: Callable[[int], Any] | None = None  # of a process that was started here
 
 
@@ -17,6 +17,9 @@ def each(task: Callable[[int], T], count: int, long: bool) -> list[T]:
 
     One after the other where the system cannot fork, and in a process that is one of several or must not have children.
     """
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import current_process, get_all_start_methods, get_context
+
     forks = "fork" in get_all_start_methods() and hasattr(os, "sched_getaffinity")
     cores = len(os.sched_getaffinity(0)) if forks else 1
     if count < 2 or cores < 2 or not long or _task or current_process().daemon:
@@ -27,8 +30,11 @@ def each(task: Callable[[int], T], count: int, long: bool) -> list[T]:
 
 
 def _take(task: Callable[[int], Any]) -> None:
+    from threadpoolctl import threadpool_limits
+
     global _task
     _task = task
+    threadpool_limits(1)  # each has a core
 
 
 def _done(k: int) -> Any:

@@ -12,6 +12,7 @@ import traceback
 from gyrobench.commands import streams
 from gyrobench.commands.app import app
 from gyrobench.reading import visible
+from gyrobench.side_by_side import ONE_THREAD
 from gyrobench.workflow.user_errors import exit_code, user_message
 
 for module in (
@@ -23,6 +24,8 @@ for module in (
 def main() -> None:
     """Run a command; an error ends in one message and an exit code, with a traceback if GYROBENCH_TRACEBACK=1."""
     streams.prepare()
+    for name in ONE_THREAD:
+        os.environ.setdefault(name, "1")
     gc.set_threshold(50_000, 20, 20)  # what is imported stays: looking for garbage among it took 6 % of a report
     for name in ("SIGTERM", "SIGHUP"):  # as Ctrl-C: files that are being written are finished or removed
         if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is signal.SIG_DFL:

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 from gyrobench.bench import UsageError
 from gyrobench.campaign.execution.store import CampaignError
 from gyrobench.files import cores, temporary_folder
+from gyrobench.side_by_side import ONE_THREAD
 
 if TYPE_CHECKING:
     from distributed import Client
 
 TEMPORARY = "gyrobench"
-ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
 @contextlib.contextmanager
