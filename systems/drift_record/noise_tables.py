@@ -259,8 +259,8 @@ def curve_text(noise: NoiseModel) -> str:
     of += [g.tau.determined and g.tau.value > slow for g in noise.processes]
     if not noise.agrees or not any(of):
         return ""
-    if noise.steep < STEEP:
-        p = write_p(noise.steep).text
+    if (steep := noise.chances["steep"]) < STEEP:
+        p = write_p(steep).text
         why = f"it falls faster with frequency than its terms do (p {p if p.startswith('<') else f'= {p}'})"
     elif t.settling or t.swings or any(x.frequency * t.samples < FEW_CYCLES for x in t.lines):
         why = "what was taken out of it settles or has few cycles, and need not be an exponential or a sine"

@@ -17,7 +17,7 @@ def test_a_polynomial_is_no_random_walk() -> None:
     white = rng.normal(size=n)
     curve = 1.5 * np.polynomial.legendre.legval(2.0 * np.arange(n) / n - 1.0, np.append([0.0, 0.0], rng.normal(size=4)))
     model = fit_noise(white + curve, 1.0, means=False)
-    assert model["K"].determined and model.steep < 0.005
+    assert model["K"].determined and model.chances["steep"] < 0.005
 
 
 @pytest.mark.long
@@ -28,7 +28,7 @@ def test_a_random_walk_is_no_curve() -> None:
         for K in (0.01, 0.1):
             rng = np.random.default_rng([80, seed])
             x = rng.normal(size=n) + np.cumsum(K * rng.normal(size=n))
-            said += fit_noise(x, 1.0, means=False).steep < 0.03
+            said += fit_noise(x, 1.0, means=False).chances["steep"] < 0.03
     assert said <= 1
 
 

@@ -112,8 +112,7 @@ def fit_noise(
         agreements=(whole.scaled(scale.size, tau0), clean.scaled(scale.size, tau0)),
         with_wild={n: v * scale.units[n] for n, v in _with_wild(treated, at, found, means).items()},
         models=len(found.seen),
-        filtered=filter_probability(clouds),
-        steep=steep_fall(found, at),
+        chances={"filtered": filter_probability(clouds), "steep": steep_fall(found, at)},
     )
 
 

@@ -94,8 +94,8 @@ class NoiseModel:
     coefficients: N [unit sqrt(s)], B [unit], K [unit/sqrt(s)], R [unit/s, signed], Q [unit s].  shape: terms and their
     parameters in units of ``scale``, as the treatment is.  agreements: with the record as it was, and without what was
     taken out.  with_wild: coefficients with the wild samples left in.  models: how many were compared.
-    filtered: probability that the white noise has passed a filter.  steep: probability of so steep a fall of the slow
-    drift by chance; see :mod:`gyrobench.reduction.noise_model.one_curve`.
+    chances: filtered, that the white noise has passed a filter; steep, of so steep a fall of the slow drift by chance,
+    see :mod:`gyrobench.reduction.noise_model.one_curve`.
     """
 
     scale: Scale
@@ -107,8 +107,7 @@ class NoiseModel:
     agreements: tuple[DeviationAgreement, DeviationAgreement]
     with_wild: dict[str, float]
     models: int
-    filtered: float
-    steep: float
+    chances: dict[str, float]
 
     def __getitem__(self, name: str) -> Estimate:
         """Return a coefficient."""
@@ -194,7 +193,7 @@ class NoiseModel:
 
     def filter_words(self) -> str:
         """Return what the sensor's filter is, in words; "" where the record does not show that there is one."""
-        if self.filtered < 1.0 - ABSENT:
+        if self.chances["filtered"] < 1.0 - ABSENT:
             return ""
         found = next(((t, q) for t, q in split(*self.shape) if t.name == "white" and t.filter != "none"), None)
         if found is None:
