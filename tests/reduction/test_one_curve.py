@@ -34,4 +34,4 @@ def test_a_random_walk_is_no_curve() -> None:
 
 def test_white_noise_has_no_slow_drift() -> None:
     x = np.random.default_rng([80, 1]).normal(size=2000)
-    assert fit_noise(x, 1.0, means=False).steep == 1.0
+    assert fit_noise(x, 1.0, means=False).chances["steep"] == 1.0
