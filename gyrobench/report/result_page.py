@@ -186,7 +186,7 @@ def _coefficient(report: Report[Result], k: int, unit: bool, truth: bool, limits
         *([number("truth"), number("z", u=0.1)] if truth else []),
     ]
     if limits:
-        verdict = c.verdict if c.limit is not None or c.no_value else "–"
+        verdict = "–" if c.verdict == NO_VERDICT else c.verdict
         cells += [text_cell(limit_text(c.limit)), text_cell(verdict, verdict)]
     return cells
 
