@@ -5,11 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from scipy.spatial.transform import Rotation
-
 from gyrobench.system.connectors import Socket, inp, out
-from gyrobench.system.families.loop_test import AXES, MOVED, ThreeAxisTest, TwoGyroTest, torquer
+from gyrobench.system.families.loop_test import AXES, MOVED, ThreeAxisTest, TwoGyroTest, commanded
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option, Slot
@@ -26,12 +23,7 @@ FOLLOWER = Socket(
     ),
 )
 TERMS = ("x", "y", "z", "xx", "yy", "zz", "xy", "yz", "xz")  # of the static drift, per g and g2: compensated
-COMMANDS = {
-    "follower.command[1] -> gyro_b.i_x": torquer("gyro_b.k_x"),
-    "follower.command[2] -> gyro_a.i_y": torquer("gyro_a.k_y"),
-    "follower.command[3] -> gyro_a.i_x": torquer("gyro_a.k_x"),
-    "follower.command[3] -> gyro_b.i_y": torquer("gyro_b.k_y"),
-}
+COMMANDS = commanded("follower.command")
 
 
 class PlatformFollowing(TwoGyroTest):
@@ -51,14 +43,9 @@ class PlatformFollowing(TwoGyroTest):
         motion="base_motion", load="load_torque", platform="platform_three_gimbal_2dof", gyro_a="gyro_2dof",
         gyro_b="gyro_2dof", decoupler="decoupler_t2", **dict.fromkeys(AXES, "stabilizer_lead_lag"),
     ) | {"follower": Slot(FOLLOWER, "earth_follower")}  # fmt: skip
-    wires = MOVED + ThreeAxisTest.wires + """
-        platform -> gyro_a: omega f
-        platform -> gyro_b: omega f
-        gyro_b.u_y -> decoupler.u[1]
-        gyro_a.u_x -> decoupler.u[2]
-        gyro_a.u_y -> decoupler.u[3]
-        exciter.command -> follower.extra
-        """ + "\n".join(COMMANDS)  # fmt: skip
+    wires = "\n".join(
+        (MOVED + ThreeAxisTest.wires + TwoGyroTest.sensed, "exciter.command -> follower.extra", *COMMANDS)
+    )
     factors = COMMANDS
     options = {
         "latitude": Option(
@@ -96,13 +83,6 @@ class PlatformFollowing(TwoGyroTest):
     )  # fmt: skip
     shown = ("platform.attitude", "follower.turned", "platform.theta", "motion.angle", "platform.saturated")
 
-    bodies = """
-        base: z motion.angle[3], x motion.angle[1], y motion.angle[2]
-        outer gimbal: base, outer platform
-        middle gimbal: outer gimbal, middle platform
-        inner element: middle gimbal, z platform.theta[3]
-    """
-
     def phases(self) -> list[LoopPhase]:
         return [LoopPhase("follow", "hold", settle=max(10.0, 2 * self.wait), dwell=self["time"])]
 
@@ -114,13 +94,10 @@ class PlatformFollowing(TwoGyroTest):
             "follower.velocity": [self["east"], self["north"]],
             "follower.velocity_error": [self["velocity_error"]] * 2,
         }
-        for sign, (gyro, mount) in zip((1.0, -1.0), self.mounts.items(), strict=True):
-            error = Rotation.from_rotvec(np.full(3, sign * self["mounting"])).as_matrix()
-            found[f"{gyro}.mount"] = (np.array(mount, float) @ error).tolist()
+        for gyro in self.mounts:
             found |= {f"{gyro}.D{c}_{n}?": 0.0 for c in "xy" for n in TERMS}
             found |= {f"{gyro}.D{c}_0?": self["residual"] for c in "xy"}
-            found |= {f"{gyro}.{k}": parts[f"{gyro}.{k}"] * (1.0 + self["torquer"]) for k in ("k_x", "k_y")}
-        return found
+        return found | self.misplaced(parts)
 
     def check(self) -> list[str]:
         problems = super().check()

@@ -7,22 +7,15 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from gyrobench.system import flight_plan
-from gyrobench.system.families.loop_test import AXES, TwoGyroTest, three, torquer
+from gyrobench.system.families.loop_test import AXES, TwoGyroTest, commanded, three
 from gyrobench.system.flight_plan import Leg
 from gyrobench.system.loop_plan import LoopPhase
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import Option
 
-#: commanded rate -> torquer; a current is the rate over the scale factor that the torquer is believed to have
-COMMANDS = {
-    "exciter.command[1] -> gyro_b.i_x": torquer("gyro_b.k_x"),
-    "exciter.command[2] -> gyro_a.i_y": torquer("gyro_a.k_y"),
-    "exciter.command[3] -> gyro_a.i_x": torquer("gyro_a.k_x"),
-    "exciter.command[3] -> gyro_b.i_y": torquer("gyro_b.k_y"),
-}
+COMMANDS = commanded("exciter.command")
 
 
 class PlatformThreeGimbal(TwoGyroTest):
@@ -70,13 +63,6 @@ class PlatformThreeGimbal(TwoGyroTest):
         "platform.lock gyro_a.saturated gyro_b.saturated",
     )  # fmt: skip
 
-    bodies = """
-        base: z motion.angle[3], x motion.angle[1], y motion.angle[2]
-        outer gimbal: base, outer platform
-        middle gimbal: outer gimbal, middle platform
-        inner element: middle gimbal, z platform.theta[3]
-    """
-
     def legs(self) -> list[Leg]:
         """Return the flight and the way back; whole steps, so that the angles are exact."""
         found: list[Leg] = []
@@ -108,11 +94,7 @@ class PlatformThreeGimbal(TwoGyroTest):
             "decoupler.offset?": self["resolver_offset"],
             **{f"{axis}.integral?": self["integral"] for axis in self.signals},
         }
-        for sign, (gyro, mount) in zip((1.0, -1.0), self.mounts.items(), strict=True):
-            error = Rotation.from_rotvec(np.full(3, sign * self["mounting"])).as_matrix()
-            found[f"{gyro}.mount"] = (np.array(mount, float) @ error).tolist()
-            found |= {f"{gyro}.{k}": parts[f"{gyro}.{k}"] * (1.0 + self["torquer"]) for k in ("k_x", "k_y")}
-        return found
+        return found | self.misplaced(parts)
 
     def check_parameters(self, parameters: Mapping[str, Any]) -> list[str]:
         problems = []

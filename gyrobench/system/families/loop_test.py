@@ -19,6 +19,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+
 from gyrobench.record.motion_profile import read_profile
 from gyrobench.system.families.option_groups import GYRO_NOISES
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan, sweep
@@ -201,6 +203,18 @@ class ThreeAxisTest(LoopTest):
     loops: ClassVar[dict[str, str]] = {axis: f"{axis}.u" for axis in AXES}
 
 
+def commanded(rates: str) -> dict[str, Callable[[PartValues], float]]:
+    """Return the wires from three commanded rates to the torquers of two gyros, each with its factor: a current is the
+    rate over the scale factor that the torquer is believed to have.
+    """
+    return {
+        f"{rates}[1] -> gyro_b.i_x": torquer("gyro_b.k_x"),
+        f"{rates}[2] -> gyro_a.i_y": torquer("gyro_a.k_y"),
+        f"{rates}[3] -> gyro_a.i_x": torquer("gyro_a.k_x"),
+        f"{rates}[3] -> gyro_b.i_y": torquer("gyro_b.k_y"),
+    }
+
+
 class TwoGyroTest(ThreeAxisTest):
     """A platform of rate servos with two gyros, their rotors at right angles: gyro_a feels y and z, gyro_b z and x.
 
@@ -220,13 +234,14 @@ class TwoGyroTest(ThreeAxisTest):
         "decoupler": Slot("Decoupler"),
         **{axis: stabilizer() for axis in AXES},
     }
-    wires = FLOWN + ThreeAxisTest.wires + """
+    sensed: ClassVar[str] = """
         platform -> gyro_a: omega f
         platform -> gyro_b: omega f
         gyro_b.u_y -> decoupler.u[1]
         gyro_a.u_x -> decoupler.u[2]
         gyro_a.u_y -> decoupler.u[3]
-        """  # fmt: skip
+        """
+    wires = FLOWN + ThreeAxisTest.wires + sensed
     options: ClassVar[dict[str, Option]] = {
         "feedback": Option(40.0, "1/s", "rate of a servo for an angle of the platform", 1.0),
         "load": Option(50.0, "N.m", "disturbance torque of the steps"),
@@ -235,6 +250,12 @@ class TwoGyroTest(ThreeAxisTest):
     noises = noises(mounts, ("_x", "_y"))
     step = 5e-4
     channel_period = 2e-3
+    bodies = """
+        base: z motion.angle[3], x motion.angle[1], y motion.angle[2]
+        outer gimbal: base, outer platform
+        middle gimbal: outer gimbal, middle platform
+        inner element: middle gimbal, z platform.theta[3]
+    """
 
     @property
     def wait(self) -> float:
@@ -270,6 +291,17 @@ class TwoGyroTest(ThreeAxisTest):
             pickoff = parts[signal.replace("._", ".K_sg_")]
             found |= {f"{axis}.{n}?": 1.0 for n in ("tau1", "T1", "tau2", "T2")}
             found[f"{axis}.K"] = self["feedback"] / (pickoff * parts["platform.rate_gain"])
+        return found
+
+    def misplaced(self, parts: PartValues) -> dict[str, Any]:
+        """Return the gyros with the errors of their mounting and of their torquers, options of some of these tests."""
+        from scipy.spatial.transform import Rotation
+
+        found: dict[str, Any] = {}
+        for sign, (gyro, mount) in zip((1.0, -1.0), self.mounts.items(), strict=True):
+            error = Rotation.from_rotvec(np.full(3, sign * self["mounting"])).as_matrix()
+            found[f"{gyro}.mount"] = (np.array(mount, float) @ error).tolist()
+            found |= {f"{gyro}.{k}": parts[f"{gyro}.{k}"] * (1.0 + self["torquer"]) for k in ("k_x", "k_y")}
         return found
 
     def crossovers(self) -> dict[str, float]:
