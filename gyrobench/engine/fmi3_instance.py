@@ -30,7 +30,7 @@ class FmuInstance3(FmuInstance):
     """An FMI 3.0 co-simulation FMU in this process; the differences from FMI 2.0."""
 
     fmi3 = True
-    prefix, state = "fmi3", "FMUState"
+    prefix, state, restore = "fmi3", "FMUState", "deserializeFMUState"
 
     def new_slave(self) -> Any:
         """Return FMPy's class of such FMUs."""
@@ -105,30 +105,6 @@ class FmuInstance3(FmuInstance):
             if not early or not left > REST * h:
                 return
             start = last
-
-    def save_state(self) -> bytes:
-        """Return the serialized state.  Raises FmuCallError."""
-        self.note("serializeFMUstate")
-        try:
-            state = self.fmu.getFMUState()
-            try:
-                return bytes(self.fmu.serializeFMUState(state))
-            finally:
-                self.fmu.freeFMUState(state)
-        except Exception as error:
-            raise self.fail("serializeFMUState", error) from None
-
-    def load_state(self, data: bytes) -> None:
-        """Set the initialized FMU to a serialized state.  Raises FmuCallError."""
-        self.note("deSerializeFMUstate")
-        try:
-            state = self.fmu.deserializeFMUState(data)
-            try:
-                self.fmu.setFMUState(state)
-            finally:
-                self.fmu.freeFMUState(state)
-        except Exception as error:
-            raise self.fail("deserializeFMUState", error) from None
 
 
 def _number(text: str | None, group: VariableGroup) -> Any:

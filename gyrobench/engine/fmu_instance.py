@@ -118,7 +118,7 @@ class FmuInstance:
     """
 
     fmi3 = False
-    prefix, state = "fmi2", "FMUstate"
+    prefix, state, restore = "fmi2", "FMUstate", "deSerializeFMUstate"
 
     def __init__(self, slot: str, description: Any, folder: Path, status: Status | None = None, part: int = 0) -> None:
         self.slot, self.description = slot, description
@@ -247,29 +247,32 @@ class FmuInstance:
         """Return the address of a function of the library."""
         return ctypes.cast(getattr(self.fmu.dll, name), ctypes.c_void_p).value or 0
 
+    def _of_state(self, verb: str) -> Any:
+        return getattr(self.fmu, verb + self.state)
+
     def save_state(self) -> bytes:
         """Return the serialized state.  Raises FmuCallError."""
         self.note("serializeFMUstate")
         try:
-            state = self.fmu.getFMUstate()
+            state = self._of_state("get")()
             try:
-                return bytes(self.fmu.serializeFMUstate(state))
+                return bytes(self._of_state("serialize")(state))
             finally:
-                self.fmu.freeFMUstate(state)
+                self._of_state("free")(state)
         except Exception as error:
-            raise self.fail("serializeFMUstate", error) from None
+            raise self.fail(f"serialize{self.state}", error) from None
 
     def load_state(self, data: bytes) -> None:
         """Set the initialized FMU to a serialized state.  Raises FmuCallError."""
         self.note("deSerializeFMUstate")
         try:
-            state = self.fmu.deSerializeFMUstate(data)
+            state = getattr(self.fmu, self.restore)(data)
             try:
-                self.fmu.setFMUstate(state)
+                self._of_state("set")(state)
             finally:
-                self.fmu.freeFMUstate(state)
+                self._of_state("free")(state)
         except Exception as error:
-            raise self.fail("deSerializeFMUstate", error) from None
+            raise self.fail(self.restore, error) from None
 
     def free(self) -> None:
         """Terminate and free the instance; a second call does nothing."""
