@@ -243,7 +243,7 @@ def search_plan(search: Search, design: ApproximateDesign, visits: int, time: fl
     return exchanged(search, design, best, time)
 
 
-def _tempting(search: Search, design: ApproximateDesign) -> NDArray[np.int_]:
+def _tempting(design: ApproximateDesign) -> NDArray[np.int_]:
     """Return the candidates that an exchange may bring in: those with shares and those next to have some."""
     number = max(12, int(np.sum(design.shares > 1e-3)))
     return np.unique([*np.argsort(-design.gradient)[:number], *np.argsort(-design.shares)[:number]])
@@ -251,7 +251,7 @@ def _tempting(search: Search, design: ApproximateDesign) -> NDArray[np.int_]:
 
 def _replaced(search: Search, design: ApproximateDesign, places: Sequence[int]) -> list[int]:
     """Return the visits after each in turn was replaced by the best candidate, all of one dwell [Fedorov 1972]."""
-    places, tempting, rng = list(places), _tempting(search, design), np.random.default_rng(0)
+    places, tempting, rng = list(places), _tempting(design), np.random.default_rng(0)
     dwells = np.full(len(places), 10.0 * search.protocol.least + search.protocol.settle)
     value = search.merit(places, dwells)
     chances = design.shares[tempting] + 1e-3
@@ -278,7 +278,7 @@ def _replaced(search: Search, design: ApproximateDesign, places: Sequence[int]) 
 def exchanged(search: Search, design: ApproximateDesign, plan: ExactPlan, time: float | None) -> ExactPlan:
     """Return a plan after :data:`EXCHANGES` changes were tried, each kept where it is better."""
     timed, rng = time is not None, np.random.default_rng(len(plan.places))
-    tempting = _tempting(search, design)
+    tempting = _tempting(design)
     required = set(search.protocol.required)
     for _ in range(EXCHANGES):
         n = len(plan.places)

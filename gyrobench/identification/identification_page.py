@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,9 +36,9 @@ NAMES = {kind: f"identification.{kind}" for kind in FORMATS}
 SHOWN = 30  # frequencies of the table
 
 
-def write_identification(found: LoopIdentification, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
+def write_identification(found: LoopIdentification, folder: Path) -> dict[str, Path]:
     """Write identification.json, .html and .pdf into a folder; as :func:`gyrobench.report.report_files.write`."""
-    return write_files(found.as_dict(), lambda: page(found), folder, formats, NAMES, Bench.find().folder)
+    return write_files(found.as_dict(), lambda: page(found), folder, FORMATS, NAMES, Bench.find().folder)
 
 
 def page(t: LoopIdentification) -> Page:

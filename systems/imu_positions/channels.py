@@ -80,30 +80,30 @@ _PARAMETERS = {"bg": "gyro_bias", "Sg": "gyro_scale", "G": "g_sensitivity", "ba"
 
 
 def instruments_of(
-    parameters: Mapping[str, Any], thermal_parameters: Mapping[str, tuple[str, str]], slot: str = "imu"
+    parameters: Mapping[str, Any], thermal_parameters: Mapping[str, tuple[str, str]]
 ) -> dict[str, float] | None:
     """Return the coefficients of the simulated instruments, SI; None where they have none."""
     found: dict[str, float] = {}
     for short, long in _PARAMETERS.items():
-        if f"{slot}.{long}" not in parameters:
+        if f"imu.{long}" not in parameters:
             return None
-        values = np.asarray(parameters[f"{slot}.{long}"], dtype=float)
+        values = np.asarray(parameters[f"imu.{long}"], dtype=float)
         for i, a in enumerate(AXES):
             row = np.atleast_1d(values[i]) if values.ndim == 1 else values[i]
             names = [f"{short}_{a}"] if values.ndim == 1 else [f"{short}_{a}{b}" for b in AXES]
             found |= dict(zip(names, map(float, row), strict=True))
     for name, (short, _) in thermal_parameters.items():
-        if f"{slot}.{name}" in parameters:
-            found |= {f"{short}_{a}": float(v) for a, v in zip(AXES, parameters[f"{slot}.{name}"], strict=True)}
+        if f"imu.{name}" in parameters:
+            found |= {f"{short}_{a}": float(v) for a, v in zip(AXES, parameters[f"imu.{name}"], strict=True)}
     return found | _own_accelerometers(parameters)
 
 
-def _own_accelerometers(parameters: Mapping[str, Any], slot: str = "accelerometers") -> dict[str, float]:
+def _own_accelerometers(parameters: Mapping[str, Any]) -> dict[str, float]:
     """Return the coefficients of accelerometers that stand in their own slot, SI; {} where there are none."""
-    if f"{slot}.bias" not in parameters:
+    if "accelerometers.bias" not in parameters:
         return {}
-    bias, scale = (np.asarray(parameters[f"{slot}.{n}"], dtype=float) for n in ("bias", "scale"))
-    axes = np.reshape(np.asarray(parameters.get(f"{slot}.axes", np.eye(3)), dtype=float), (3, 3))
+    bias, scale = (np.asarray(parameters[f"accelerometers.{n}"], dtype=float) for n in ("bias", "scale"))
+    axes = np.reshape(np.asarray(parameters.get("accelerometers.axes", np.eye(3)), dtype=float), (3, 3))
     matrix = (1.0 + scale[:, None]) * axes - np.eye(3)
     found = {f"ba_{a}": float(b) for a, b in zip(AXES, bias, strict=True)}
     return found | {f"Sa_{a}{b}": float(matrix[i, j]) for i, a in enumerate(AXES) for j, b in enumerate(AXES)}

@@ -67,7 +67,7 @@ def triad_problems(matrix: Array, kind: str) -> list[str]:
             f"{NAME[kind]}: the readings are not those of three axes in these positions (matrix by rows: {rows}): "
             "a position, an axis or the sense of an angle is mistaken"
         ]
-    return [f"{NAME[kind]}: {text}" for text in (*_permuted(best, kind), *scaled(size, kind))]
+    return [f"{NAME[kind]}: {text}" for text in (*_permuted(best), *scaled(size, kind))]
 
 
 def signed_permutations() -> Iterator[Array]:
@@ -85,7 +85,7 @@ def reads(p: Array) -> str:
     return ", ".join(f"{a} reads {'−' if s < 0 else ''}{AXES[k]}" for a, k, s in zip(AXES, order, signs, strict=True))
 
 
-def _permuted(p: Array, kind: str) -> list[str]:
+def _permuted(p: Array) -> list[str]:
     order, signs = np.argmax(np.abs(p), axis=1), p.sum(axis=1)
     if np.array_equal(p, np.eye(3)):
         return []

@@ -64,11 +64,11 @@ def isolation_near(
     found.measure("isolation", meaning, "dB", size, DECIBEL * (nearest.u or 0.0), closed=form)
 
 
-def level_drift(p: Mapping[str, Any], slot: str = "gyro") -> float | None:
+def level_drift(p: Mapping[str, Any]) -> float | None:
     """Return the static drift of a gyro with x level and z up, (X, Y, Z) = (0, 0, -1), rad/s; None where unknown."""
-    if any(f"{slot}.{n}" not in p for n in LEVEL):
+    if any(f"gyro.{n}" not in p for n in LEVEL):
         return None
-    fixed, along, squared = (float(p[f"{slot}.{n}"]) for n in LEVEL)
+    fixed, along, squared = (float(p[f"gyro.{n}"]) for n in LEVEL)
     return fixed - along + squared
 
 

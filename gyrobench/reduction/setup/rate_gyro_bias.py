@@ -20,14 +20,14 @@ BESIDE = (
 HARMONICS = 1000  # of the sawtooth: the others make 1e-3 of its square
 
 
-def bias_is_all(parameters: Mapping[str, Any], slot: str = "gyro") -> bool:
+def bias_is_all(parameters: Mapping[str, Any]) -> bool:
     """Return whether the parameter `bias` is the whole bias at rest and at the temperature of the coefficients.
 
     Quadrature counts where a phase error lets it through.  Not considered: field and temperature of surroundings.
     """
 
     def there(name: str) -> bool:
-        return bool(np.any(np.asarray(parameters.get(f"{slot}.{name}", 0.0), dtype=float)))
+        return bool(np.any(np.asarray(parameters.get(f"gyro.{name}", 0.0), dtype=float)))
 
     return not (any(there(n) for n in BESIDE) or (there("quadrature") and there("phase_error")))
 
@@ -47,9 +47,9 @@ def word_error(parameters: Mapping[str, Any], slot: str = "gyro") -> float:
     return q * math.sqrt(float(np.sum(np.exp(-((2.0 * math.pi * k * s / q) ** 2)) / (2.0 * (math.pi * k) ** 2))))
 
 
-def whole_angle(parameters: Mapping[str, Any], slot: str = "gyro") -> bool:
+def whole_angle(parameters: Mapping[str, Any]) -> bool:
     """Return whether the gyro of a run is a whole-angle one, whose drift goes round with its pattern."""
-    return f"{slot}.readout_mismatch" in parameters
+    return "gyro.readout_mismatch" in parameters
 
 
 def doubts_at_rest(parameters: Mapping[str, Any]) -> list[Reason]:
@@ -64,9 +64,9 @@ def doubts_at_rest(parameters: Mapping[str, Any]) -> list[Reason]:
     return pattern + dithered(parameters)
 
 
-def dithered(parameters: Mapping[str, Any], slot: str = "gyro") -> list[Reason]:
+def dithered(parameters: Mapping[str, Any]) -> list[Reason]:
     """Return that the dither of a simulated ring laser is in its output."""
-    if not parameters.get(f"{slot}.dither", 0.0) or parameters.get(f"{slot}.stripped", 1.0) > 0.5:
+    if not parameters.get("gyro.dither", 0.0) or parameters.get("gyro.stripped", 1.0) > 0.5:
         return []
     text = (
         "The dither is in the output (stripped = 0). What its samples fold down is in the means, and in no residual "
@@ -75,9 +75,9 @@ def dithered(parameters: Mapping[str, Any], slot: str = "gyro") -> list[Reason]:
     return [Reason("gyro.dithered", text, ("pass", "fail"), severity="doubt")]
 
 
-def unanswered(parameters: Mapping[str, Any], slot: str = "gyro") -> list[Reason]:
+def unanswered(parameters: Mapping[str, Any]) -> list[Reason]:
     """Return that a simulated gyro with a dead band or a lock-in does not answer the Earth rate, or less of it."""
-    p = {n: float(parameters.get(f"{slot}.{n}", 0.0)) for n in ("dead_band", "lock_in", "dither", "closed")}
+    p = {n: float(parameters.get(f"gyro.{n}", 0.0)) for n in ("dead_band", "lock_in", "dither", "closed")}
     locked = 0.0 if p["dither"] else p["lock_in"]
     band = max(locked, p["dead_band"] * (p["closed"] > 0.5)) / DPH
     if not band:
