@@ -33,13 +33,13 @@ SENSOR = {
 
 
 #: wires that lead past a foundation, and those through it
-DIRECT = """
-    site -> table: f=f_local omega=omega_local
+FELT = """
     site -> table: alpha=alpha_local
     site.omega[1] -> sampler_rate.x
     site.tilt[1] -> sampler_east.x
     site.tilt[2] -> sampler_north.x
 """
+DIRECT = "site -> table: f=f_local omega=omega_local" + FELT
 ABOVE = """
     site -> foundation: g a tilt tilt_rate tilt_acceleration omega alpha
     foundation -> table: f_block=f_local omega_block=omega_local alpha_block=alpha_local
@@ -72,11 +72,8 @@ class TableEnvironment(RebalanceTest):
     wires = (
         RebalanceTest.wires
         + HEAT.wires
+        + FELT
         + """
-        site -> table: alpha=alpha_local
-        site.omega[1] -> sampler_rate.x
-        site.tilt[1] -> sampler_east.x
-        site.tilt[2] -> sampler_north.x
         surroundings.dT[2] -> sampler_difference.x
         surroundings.B[1] -> sampler_field.x
         """
