@@ -95,7 +95,7 @@ class Reduction(DriftReduction[FixedPositionSetup]):
 
     def problems(self) -> list[str]:
         s, still = self.setup, np.zeros(len(self.windows.get("mean", ())))
-        problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
+        problems = s.site_problems()
         problems += scale_factor_problems(s.k) + frames.rotation_problems({"attitude": s.attitude})
         problems += window_problems({"phase": still, "angle_start": still, "angle_end": still, **self.windows})
         if not problems and still.size < LEAST:

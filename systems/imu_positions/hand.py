@@ -20,7 +20,6 @@ from functools import cached_property
 
 import numpy as np
 
-from gyrobench import frames
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.reduction.toolkit import (
@@ -72,9 +71,7 @@ class HandReduction(ChannelTests[HandSetup]):
         return cls.reduce(record.windows, HandSetup.of_record(record))
 
     def problems(self) -> list[str]:
-        s = self.setup
-        problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
-        if problems := problems + window_problems(self.windows, COLUMNS):
+        if problems := self.setup.site_problems() + window_problems(self.windows, COLUMNS):
             return problems
         at = self.at
         if len(at.start) < norms.LEAST:

@@ -315,8 +315,7 @@ class Reduction(ChannelTests[ImuSetup]):
 
     def problems(self) -> list[str]:
         s = self.setup
-        problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
-        if problems := problems + window_problems(self.windows, COLUMNS):
+        if problems := s.site_problems() + window_problems(self.windows, COLUMNS):
             return problems
         force = self.kinematics.felt[1][self.kinematics.motion.at_rest]
         if problems := geometry.force_problems(_places(force) / s.gravity):

@@ -26,7 +26,6 @@ from functools import cached_property
 
 import numpy as np
 
-from gyrobench import frames
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.setup import sources
@@ -188,8 +187,7 @@ class UpDownReduction(ChannelTests[ImuSetup]):
 
     def problems(self) -> list[str]:
         s = self.setup
-        problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
-        if problems := problems + window_problems(self.windows, COLUMNS):
+        if problems := s.site_problems() + window_problems(self.windows, COLUMNS):
             return problems
         if not self.axes:
             seen = [

@@ -107,7 +107,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
 
     def problems(self) -> list[str]:
         s = self.setup
-        problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
+        problems = s.site_problems()
         if s.method not in plans.PARTS:
             problems.append(f"method = {s.method}: must be one of {', '.join(plans.PARTS)}")
         problems += after.lost(s.method, GYRO_BIAS.size(s), s.latitude)

@@ -169,7 +169,7 @@ class Reduction(ChannelTests[PositionSetup]):
     def problems(self) -> list[str]:
         s, w = self.setup, self.windows
         still = np.zeros(len(w.get("t_start", ())))
-        problems = frames.latitude_problems(s.latitude) + frames.gravity_problems(s.gravity)
+        problems = s.site_problems()
         problems += [text for a, k in s.k.items() for text in scale_factor_problems(k, f"k_{a}")]
         problems += [f"K_sg_{a} = {v:g} V/rad: must be > 0" for a, v in s.K_sg.items() if not v > 0.0]
         problems += window_problems({"phase": still, "angle_start": still, "angle_end": still, **w}, COLUMNS)

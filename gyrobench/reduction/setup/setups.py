@@ -101,6 +101,10 @@ class SiteSetup(Setup):
     def place(self) -> Location:
         return Location(self.latitude, self.gravity, self.earth_rate)
 
+    def site_problems(self) -> list[str]:
+        """Return what is wrong with latitude and gravity, as sentences."""
+        return frames.latitude_problems(self.latitude) + frames.gravity_problems(self.gravity)
+
     @property
     def shown(self) -> dict[str, Any]:
         return self.place.shown()
