@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from gyrobench.arrays import Array
 from gyrobench.bench import Bench, UsageError
 from gyrobench.errors import GyrobenchError
+from gyrobench.exchange.excitations import check_excitations
 from gyrobench.exchange.external_record import ResultReader, check_parameters, find_series
 from gyrobench.exchange.result_files import ResultFile, open_result
 from gyrobench.exchange.ssp_export import recorded
@@ -92,6 +93,7 @@ def external_record(session: Session, result: ResultFile, data: DataFile) -> Rec
     reader = ResultReader(system, result, series, run.step)
     reader.read()
     record = reader.record(run)
+    check_excitations(record)
     if missing := [n for n in missing if n in system.channels]:
         run.notes.append(f"Channels that are not in the file: {', '.join(missing)}.")
     # without the end of the plan in the file: a window by angle less may be as it should

@@ -69,6 +69,28 @@ def test_a_loop_test_stops_where_its_plan_ends(tmp_path: Path) -> None:
     assert found["exciter.done"][-1] == 1.0 and found["exciter.done"][found["time"] < planned - 0.5].max() == 0.0
 
 
+def test_another_load_than_that_of_the_reduction_is_refused(tmp_path: Path) -> None:
+    """The tool doubles the load of the step, its file does not say so: its angle over 1 N.m would be twice as large.
+
+    With the same value here the torque over the largest angle, N.m/rad, is the one of the run with 1 N.m: the loop is
+    linear, and beside it the gyro's own drift of 0.42 °/h = 0.42″/s moves the 75″ by less than 1 % until the largest.
+    """
+    values = {"hold": "10s"}
+    export_fmu(load_system("platform_single_axis"), tmp_path / "p.fmu", values=values)
+    runs = [simulate_fmu(str(tmp_path / "p.fmu"), stop_time=17.0, output_interval=1e-3, start_values=start)
+            for start in ({}, {"load_step": 2.0})]  # fmt: skip
+    test = gb.load("platform_single_axis", values)
+    one = estimates(test.reduce_result(runs[0]))
+    with pytest.raises(gb.GyrobenchError, match=r"phase 1 'load step': exciter.torque\[1\] has 2 N.m, here it is 1"):
+        test.reduce_result(runs[1])
+    two = estimates(gb.load("platform_single_axis", {**values, "load_step": 2.0}).reduce_result(runs[1]))
+    assert two["load/peak"] == pytest.approx(one["load/peak"], rel=1e-2)
+    sine = runs[0].copy()
+    sine["exciter.test[1]"] *= 1.5
+    with pytest.raises(gb.GyrobenchError, match=r"'loop 2 Hz': exciter.test\[1\] has 0.03 V, here it is 0.02"):
+        test.reduce_result(sine)
+
+
 def test_a_container_gives_all_that_a_record_needs(tmp_path: Path) -> None:
     """What is wired inside is an output too, with its unit; its order in the structure is that of the variables."""
     if importlib.util.find_spec("fmu_manipulation_toolbox") is None:
