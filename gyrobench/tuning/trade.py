@@ -1,11 +1,13 @@
 """Trade of two wishes: what one gives up for the other, the worst case of each over the spread.
 
 The two are wanted more and less, q and 1/q times what was asked for, and the search goes on from one q to the next; of
-what comes the points stay that no other beats in both.  Each is the best that was found: a local search, linear models.
+what comes the points stay that no other beats in both.  Of all other wishes no more than the wanted is kept: what they
+have beyond it goes to the two.  Each point is the best that was found: a local search, linear models.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -19,6 +21,8 @@ from gyrobench.tuning.wishes import Wish
 WIDE = 3.0  # factor by which each of the two is wanted more and less
 SIDE = 4  # points on either side of what was asked for
 WORK = 50  # evaluations of a simplex
+ROUNDS = 4  # of a point: the two are wanted by as much more as the round before had of everything
+LOST = -1.0  # ln ratio of a point that has not been found
 
 
 @dataclass(frozen=True)
@@ -57,12 +61,8 @@ def trade(problem: TuningProblem, x: Array, places: tuple[int, int]) -> Trade:
     found = [_point(problem, x, places)]
     for sense in (1.0, -1.0):
         near = x
-        for q in WIDE ** (sense * np.arange(1, SIDE + 1) / SIDE):
-            wishes = list(problem.wishes)
-            wishes[i], wishes[j] = _times(wishes[i], q), _times(wishes[j], 1.0 / q)
-            asked = replace(problem, wishes=wishes, evaluations=0)
-            near = polished(asked, simplex_from(asked, near, 0.06, WORK), 10)
-            problem.evaluations += asked.evaluations
+        for q in WIDE ** (sense * np.arange(SIDE + 1) / SIDE):
+            near = _between(problem, near, places, q)
             found.append(_point(problem, near, places))
     a, b = problem.wishes[i], problem.wishes[j]
     kept = [
@@ -73,6 +73,23 @@ def trade(problem: TuningProblem, x: Array, places: tuple[int, int]) -> Trade:
     ]  # fmt: skip
     unique = {(p.first, p.second): p for p in kept}
     return Trade((a, b), tuple(sorted(unique.values(), key=lambda p: p.first)))
+
+
+def _between(problem: TuningProblem, x: Array, places: tuple[int, int], q: float) -> Array:
+    """Return the best controller near x for q : 1/q of the two wishes, with all others fulfilled."""
+    i, j = places
+    reserve = 1.0
+    for _ in range(ROUNDS):
+        wishes = list(problem.wishes)
+        wishes[i], wishes[j] = _times(wishes[i], q * reserve), _times(wishes[j], reserve / q)
+        asked = replace(problem, wishes=wishes, evaluations=0)
+        x = polished(asked, simplex_from(asked, x, 0.06, WORK), 10)
+        problem.evaluations += asked.evaluations
+        worst = asked.worst(x)
+        if worst < LOST:
+            break
+        reserve *= math.exp(worst)
+    return x
 
 
 def _times(wish: Wish, q: float) -> Wish:

@@ -97,9 +97,9 @@ def tune(
         problem = models.problem(shape, wishes)
         x = search(problem)
         x = _worse_points(models, problem, x)
+        exchanged = trade(problem, x, pair) if pair else None  # of the best: the quiet one has given some of it away
         quiet_one = quieted(problem, x)
         x = quiet_one.x if quiet_one else x
-        exchanged = trade(problem, x, pair) if pair else None
     try:
         controller = problem.controller(x)
     except ArithmeticError as error:
