@@ -349,3 +349,7 @@ def test_template_is_reduced_when_filled_in(gyrobench: Command, tmp_path: Path) 
     assert code == 2 and "r: holds another run (its data differ)" in err
     assert gyrobench("reduce", "torquer_scale_factor", "--data", "u.csv", "--out", "r", "--force")[0] == 0
     assert gyrobench("report", "r")[0] == 0
+
+
+def test_the_command_after_init_holds_for_a_folder_with_blanks(gyrobench: Command, tmp_path: Path) -> None:
+    assert "a new bench; cd 'Prüfstand 1' and gyrobench list" in gyrobench("init", "Prüfstand 1")[1]

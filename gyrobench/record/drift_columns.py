@@ -231,7 +231,8 @@ def find_signals(table: DriftTable, channel: str, scale: str, increments: bool) 
         elif channel:
             problems.append(found)
     if not signals and not problems:
-        whys = [_signal(n, there[n], scale, increments) for n in wanted]
+        readings = [n for n in wanted if channel or not _is_temperature(there[n] or "1")]  # a temperature is none
+        whys = [_signal(n, there[n], scale, increments) for n in readings]
         none = f"no rate, angle or specific force among the columns of the file ({', '.join(there)}); {SIGNALS}"
         problems = [w for w in whys if isinstance(w, str)][:4] or [none]
     if problems:

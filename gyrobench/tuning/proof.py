@@ -82,7 +82,7 @@ class ProvenWish:
         """Return "" where the wish is kept, else how it is not."""
         if not self.told:
             return "not told: noise leaves open whether it is what is wanted"
-        return "" if self.kept else "below what is wanted"
+        return "" if self.kept else f"{'below' if self.wish.least else 'above'} what is wanted"
 
     @property
     def agrees(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import re
+import shlex
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -122,7 +123,7 @@ def init_bench(folder: Path, copies: list[str]) -> list[str]:
         (folder / room / ".gitkeep").touch()  # git does not keep empty folders, and these make the bench
     (folder / "README.md").write_text(README.format(name=folder.resolve().name), encoding="utf-8")
     (folder / ".gitignore").write_text("fmus/\nreports/out/\n", encoding="utf-8")
-    lines = [f"{folder}: a new bench; cd {folder} and gyrobench list"]
+    lines = [f"{folder}: a new bench; cd {shlex.quote(str(folder))} and gyrobench list"]
     copied = [(room, name) for name in dict.fromkeys(copies) for room in ("components", "systems")]
     for room, name in copied:  # a part and a system may have the same name: then both
         source = (parts if room == "components" else systems).get(name)

@@ -34,8 +34,9 @@ TEMPLATE = """\
 #
 # '# attitudes = unknown' and latitude in place of all this: a logger's samples, CSV or Parquet, of a unit put by hand
 #   into 10 positions or more, spread over all directions, in which it stands still for some seconds; 24 are better.
-#   Columns time [s], gx, gy, gz [deg/s], ax, ay, az [g], or [counts] where the scale factors are not known.  Positions
-#   are found, or numbered in a column 'position' (0 or empty: moved).  '# attitudes = up_down': one axis up and down.
+#   Columns time [s], gx, gy, gz [deg/s], ax, ay, az [g], or [counts] where the scale factors are not known
+#   (in a column map unit = "1").  Positions are found, or numbered in a column 'position' (0 or empty: moved).
+#   '# attitudes = up_down': one axis up and down.
 phase,t_start [s],t_end [s],outer_start [deg],outer_end [deg],inner_start [deg],inner_end [deg],mean_gx [deg/s],mean_gy [deg/s],mean_gz [deg/s],mean_ax [m/s2],mean_ay [m/s2],mean_az [m/s2]
 """  # noqa: E501
 COLUMNS = (

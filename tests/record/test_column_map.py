@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import gyrobench as gb
 from gyrobench.bench import UsageError
 from gyrobench.record.column_map import MappedRows, read_map, translate
 from gyrobench.record.column_proposal import find_encoding, find_layout
@@ -228,6 +229,16 @@ def test_proposal_for_columns_without_units(tmp_path: Path) -> None:
     none, entry, unused = problems[0].split("; ")
     assert (none, unused) == ("column 'rate': none of the file fits by name and unit", "not used so far: 'a', 'b'")
     assert entry == 'write [columns.rate] with from = "ITS NAME" and unit = "deg/s"' and len(problems) == 1
+
+
+def test_a_temperature_is_not_blamed_for_a_rate_without_unit(tmp_path: Path) -> None:
+    """The column that could be the rate is named, not the one in degrees, under whatever name."""
+    file = tmp_path / "log.csv"
+    rows = "".join(f"{k},{k % 7},{20 + k % 3}\n" for k in range(600))
+    file.write_text(f"time [s],Drehrate,Gehäuse [degC]\n{rows}", encoding="utf-8")
+    with pytest.raises(gb.GyrobenchError, match="column 'Drehrate': no unit") as refused:
+        gb.reduce("drift_record", file)
+    assert "Gehäuse" not in str(refused.value)
 
 
 def test_proposal_for_a_tumble_names_what_it_lacks(tmp_path: Path) -> None:

@@ -155,3 +155,10 @@ def test_a_promised_gain_margin_is_where_the_simulation_becomes_unstable() -> No
             return float(np.std(angle[-3000:]) / np.std(angle[1000:4000]))
 
         assert growth(-42.35) > 1.5 > 0.75 > growth(-40.35)
+
+
+def test_a_wish_at_most_is_missed_above_it() -> None:
+    """123.2 rad of a jitter of at most 100 lies above, 28 of a margin of at least 40 below."""
+    jitter, margin = parse_wishes(["jitter=100urad", "phase margin=40deg"])
+    assert ProvenWish(jitter, 123.2e-6, 1.8e-6, 131e-6).verdict == "above what is wanted"
+    assert ProvenWish(margin, 0.49, 0.006, 0.52).verdict == "below what is wanted"
