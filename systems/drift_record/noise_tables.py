@@ -44,8 +44,9 @@ def absent(term: str, noise: NoiseModel) -> str:
     """Return why a coefficient has no value, and what stands in its place."""
     if term == "K" and any(t.name == "walk" for t in noise.shape[0]):
         return "not determined: the record does not tell a random walk from slow Gauss-Markov drift"
-    if term in ("B", "K") and noise.processes:
-        of = ", ".join(f"{number(g.tau.value)} s" for g in noise.processes)
+    sure = [g for g in noise.processes if g.tau.determined]
+    if term in ("B", "K") and sure:
+        of = ", ".join(f"{number(g.tau.value)} s" for g in sure)
         return f"not determined: slow drift here is Gauss-Markov, correlation time {of}"
     return "not determined: the record is too short or other noise covers it"
 

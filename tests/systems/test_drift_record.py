@@ -17,6 +17,7 @@ from commanding import Command
 from gyrobench.engine.session import Session
 from gyrobench.record import block_means
 from gyrobench.record.record import Record
+from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.series.deviations import deviations
 from gyrobench.reduction.series.noise_coefficients import fit
 from gyrobench.result import DriftRecordResult, Table
@@ -395,3 +396,11 @@ def test_an_interval_of_one_value_is_not_written() -> None:
     tables: Any = importlib.import_module(".noise_tables", type(load_system(NAME)).__module__)
     assert tables.range_text(SimpleNamespace(value=48.0, low=48.0, high=48.0)) == "48"
     assert tables.range_text(SimpleNamespace(value=25.3, low=24.1, high=27.0)) == "25.30 (24.10 to 27.00)"  # u = 0.74
+
+
+def test_a_drift_that_is_in_few_models_is_no_reason() -> None:
+    """White noise of 4000 samples; some models have a process of ten: that is not what the slow drift here is."""
+    tables: Any = importlib.import_module(".noise_tables", type(load_system(NAME)).__module__)
+    model = fit_noise(np.random.default_rng([5, 0]).normal(size=4000), 1.0, means=False)
+    assert [g.tau.determined for g in model.processes] == [False]
+    assert tables.absent("B", model) == "not determined: the record is too short or other noise covers it"
