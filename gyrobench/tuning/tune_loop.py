@@ -214,7 +214,8 @@ class _Loop:
         if self.sticks:
             at = [*at[:corners], *({**values, STICKS: 1.0} for values in at[:corners]), *at[corners:]]
             corners *= 2
-        self.plants(at[:1]), self.sights(at[:1])  # what all points have in common is kept from now on
+        if self.stated:
+            self.plants(at[:1]), self.sights(at[:1])  # what all points have in common comes along with the forks
         models, sights = self.both(at)
         shape = shape.of(models[0])
         wanted = self.system.crossovers().get(self.ports.loop)

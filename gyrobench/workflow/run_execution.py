@@ -234,7 +234,7 @@ def check_step(
             if not short:
                 raise
         sizes = {c.name: abs(c.estimate) for c in at_step}
-        if not rows or (any(r.unit != "dB" and abs(r.change) > OTHER * sizes[r.name] > 0.0 for r in rows) and short):
+        if not rows or (short and any(r.unit != "dB" and abs(r.change) > OTHER * sizes[r.name] > 0.0 for r in rows)):
             factor = 0.5
             rows = step_effects(at_step, coefficients(factor * step), factor)
     return StepCheck(step, rows, factor * step, time.perf_counter() - start)

@@ -170,10 +170,10 @@ GIVEN = {"B": "flicker", "K": "walk", "R": "ramp", "Q": "quantization"}
 
 
 #: the same of the axis x of a rate gyro
-FOLDS = 1.001  # of the density, from where on it is said to fold
 GIVEN_X = {"B": "flicker_x", "K": "walk_x"}
 #: and of that of accelerometers
 GIVEN_FORCE = {"N": "white", "B": "x_flicker", "K": "x_walk"}
+FOLDS = 1.001  # of the density, from where on it is said to fold
 
 
 def folded(parameters: Mapping[str, Any], slot: str) -> float:

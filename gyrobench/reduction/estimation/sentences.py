@@ -31,6 +31,11 @@ def seconds(t: float, digits: int = 3) -> str:
     return f"{t:.{digits}g} s" if t < 1000.0 else f"{float(f'{t:.{digits}g}'):.0f} s"
 
 
+def _is_uncertain(c: Coefficient) -> bool:
+    """Return whether a coefficient has an uncertainty that is more than rounding."""
+    return ROUNDING * abs(c.estimate) < c.k * c.u < math.inf
+
+
 def plus_minus(c: Coefficient) -> str:
     """Return "−0.3001 ± 0.0023 °/h (95 %)": estimate and expanded uncertainty, two digits; the two ends, "0.19 (0.00
     to 1.72) °/h (95 %)", of an interval that lies to one side of the estimate.
@@ -38,7 +43,7 @@ def plus_minus(c: Coefficient) -> str:
     Six digits of an estimate whose uncertainty is rounding.
     """
     U = c.k * c.u
-    if not ROUNDING * abs(c.estimate) < U or not math.isfinite(U):
+    if not _is_uncertain(c):
         return f"{c.estimate:.6g} {c.unit}".replace("-", "−")
     digits = 1 - math.floor(math.log10(U))
 
@@ -63,7 +68,7 @@ class Sentence(str):
         """Put coefficients into a template: {name}, or {-name} for the value with the other sign."""
         known = {c.name: c for c in coefficients}
         texts = {m[0]: with_u(known[m[2]], negated=bool(m[1])) for m in FIELD.finditer(template)}
-        uncertain = [field for field, text in texts.items() if "±" in text or "(" in text]
+        uncertain = [m[0] for m in FIELD.finditer(template) if _is_uncertain(known[m[2]])]
         if uncertain:  # said once, behind the last of them
             texts[uncertain[-1]] += " (95 %)"
         made = super().__new__(cls, FIELD.sub(lambda m: texts[m[0]], template))
