@@ -93,7 +93,7 @@ def _mapped(file: Path, at: str, period: str, columns: Path) -> LoopRecord:
         try:
             record = _read(text, file.name, at or stated.get(AT, ""), period or stated.get(PERIOD, ""))
         except DataError as error:
-            raise DataError(file, [*done.problems(), *error.problems]) from None
+            raise DataError(file, done.problems(error.problems)) from None
     if done.problems():
         raise DataError(file, done.problems())
     return record

@@ -5,6 +5,7 @@
     decimal = ","
     skip = 9                               # lines above the names of the columns
     below = 1                              # lines between names and rows (units)
+    names = false                          # no row of names: columns by their numbers
     table = "imu"                          # of a log that has several: a group, topic or sheet
     empty = "skip"                         # missing (default): see the reader; skip: the row; previous: as above it
 
@@ -47,13 +48,14 @@ from gyrobench.bench import UsageError, suggest_names
 from gyrobench.boundary import faults_of
 from gyrobench.record.clock_times import DATED, HALF_DAY, moment
 from gyrobench.record.column_numbers import write_numbers
-from gyrobench.record.csv_reader import HEAD_ROWS, DataError, regular, row_list, thousands
+from gyrobench.record.csv_reader import HEAD_ROWS, DataError, row_list, thousands
 from gyrobench.record.log_files import as_text, is_log
 from gyrobench.record.row_faults import NOTHING
+from gyrobench.record.text_cells import cells_of_file, without_mark
 
 Empty = Literal["missing", "skip", "previous"]
-BINARY_KINDS = {b"PK": "a spreadsheet or an archive", b"PA": "a Parquet file", b"\xd0\xcf": "an old spreadsheet"}
-BINARY = tuple(BINARY_KINDS)
+#: a row of names is written above rows that have none
+ONE_MORE = "the file has no row of names: rows are counted here as below one, one more than in the file"
 COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 
 
@@ -85,11 +87,17 @@ class ColumnMap(BaseModel):
     decimal: Literal[".", ","] = "."
     skip: int = Field(default=0, ge=0)
     below: int = Field(default=0, ge=0)
+    names: bool = True
     empty: Empty = "missing"
     table: str = ""  # of a log with several
     absent: list[str] = NOTHING  # texts of cells without a value
     columns: dict[str, MappedColumn]
     set: dict[str, str | int | float | bool] = {}
+
+    @property
+    def head(self) -> int:
+        """Lines above the first row."""
+        return self.skip + self.names + self.below
 
     def values(self) -> dict[str, str]:
         """Return what is set, as texts of --set."""
@@ -120,11 +128,15 @@ def _contradictions(found: ColumnMap) -> list[str]:
         problems.append(f"delimiter and decimal are both '{found.decimal}'")
     if not found.columns:
         problems.append("columns: none is named")
+    if found.below and not found.names:
+        problems.append("below: nothing stands between names and rows where names = false; count the lines in skip")
     for name, c in found.columns.items():
         if re.search(r"[\[\],\"]", name):
             problems.append(f"columns.{name}: a name of the bench has no unit, comma or quote")
         if bool(c.next) == (c.sources != [""]):
             problems.append(f"columns.{name}: either 'from' or 'next' is expected")
+        if not found.names and any(isinstance(source, str) and source for source in c.sources):
+            problems.append(f"columns.{name}: from: where names = false, the number of the column, from 1")
         of = found.columns.get(c.next)
         if c.next and (of is None or of.next):
             problems.append(f"columns.{name}: next = {c.next}: no column of this map with 'from'")
@@ -182,11 +194,15 @@ class MappedRows:
         for number, cells in rows:
             if number <= self.map.skip:
                 yield self._remark(cells)
-            elif number == self.map.skip + 1:
+                continue
+            if number == self.map.skip + 1:
+                cells = without_mark(cells)
                 width = len(cells)
                 self._place(cells)
                 yield _line([self._header(n, c.unit) for n, c in self.map.columns.items()])
-            elif number <= self.map.skip + 1 + self.map.below or not any(cells) or cells[0].startswith("#"):
+                if self.map.names:
+                    continue
+            if number <= self.map.head or not any(cells) or cells[0].startswith("#"):
                 waiting.append((number, None))
             else:
                 row, left_out = self._row(number, cells, width)
@@ -235,7 +251,8 @@ class MappedRows:
         while len(cells) > width and not cells[-1]:
             cells = cells[:-1]
         if len(cells) != width:
-            self._fault(f"not the {width} cells of the names in row {self.map.skip + 1}", " ".join(cells), number)
+            of = "the names in " if self.map.names else ""
+            self._fault(f"not the {width} cells of {of}row {self.map.skip + 1}", " ".join(cells), number)
             return {}, True
         row, left_out = {}, False
         for name, c, rule, places in self.read:
@@ -314,9 +331,10 @@ class MappedRows:
     def _fault(self, what: str, text: str, row: int) -> None:
         self.faults.setdefault(what, (text, []))[1].append(row)
 
-    def problems(self) -> list[str]:
-        """Return what was wrong, each with its rows."""
-        return [f"{row_list(rows)}: '{text[:60]}': {what}" for what, (text, rows) in self.faults.items()]
+    def problems(self, of_reader: Sequence[str] = ()) -> list[str]:
+        """Return what was wrong, each with its rows, before what the reader of the lines found."""
+        own = [f"{row_list(rows)}: '{text[:60]}': {what}" for what, (text, rows) in self.faults.items()]
+        return [*own, *of_reader, *([ONE_MORE] if of_reader and not self.map.names else [])]
 
     def notes(self) -> list[str]:
         """Return what was left out, for the report."""
@@ -341,29 +359,6 @@ def _line(cells: Sequence[str]) -> str:
     return text.getvalue()
 
 
-def cells_of_file(file: Path, encoding: str, delimiter: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield number and cells of each line.  Raises DataError for text in another encoding."""
-    codec = "utf-8-sig" if encoding.lower().replace("_", "-") in ("utf-8", "utf8") else encoding
-    number = 0
-    if file.is_dir():
-        raise DataError(file, ["a folder; a column map is of a text file"])
-    with regular(file).open("rb") as data:
-        if (begin := data.read(4)).startswith(BINARY):
-            raise DataError(file, [f"{BINARY_KINDS[begin[:2]]}; save the table as CSV"])
-    try:
-        with file.open(encoding=codec) as lines:
-            for number, line in enumerate(lines, 1):
-                text = line.rstrip("\n")
-                if delimiter == " ":
-                    yield number, text.split()
-                elif '"' in text:
-                    yield number, [c.strip() for c in next(csv.reader([text], delimiter=delimiter), [])]
-                else:
-                    yield number, [c.strip() for c in text.split(delimiter)]
-    except (UnicodeError, csv.Error) as error:
-        raise DataError(file, [f"after row {number}: not text in {encoding} ({error}); give its encoding"]) from None
-
-
 def translate(file: Path, columns: ColumnMap, to: Path) -> MappedRows:
     """Write a file under its map as the bench's CSV, and return what was wrong and left out.  Raises DataError."""
     done = MappedRows(columns, file)
@@ -377,8 +372,8 @@ def translate(file: Path, columns: ColumnMap, to: Path) -> MappedRows:
                 out.write(line + "\n")
     if not done.read:
         raise DataError(file, [f"no names of columns in row {columns.skip + 1} (skip = {columns.skip})"])
-    lines, above = cells_of_file(text, columns.encoding, columns.delimiter), columns.skip + 1 + columns.below
-    rows = [cells for _, cells in itertools.islice(lines, above, above + HEAD_ROWS)]
+    lines = cells_of_file(text, columns.encoding, columns.delimiter)
+    rows = [cells for _, cells in itertools.islice(lines, columns.head, columns.head + HEAD_ROWS)]
     numbers = [(name, places[0]) for name, c, _, places in done.read if not c.time]
     if wrong := [p for name, k in numbers for p in thousands(name, (r[k] for r in rows if len(r) > k))]:
         raise DataError(file, wrong)
@@ -390,11 +385,12 @@ def _quick(file: Path, done: MappedRows, to: Path) -> bool:
     m = done.map
     if any(c.time or c.next for c in m.columns.values()):
         return False
-    head = m.skip + 1 + m.below
+    above = m.skip + 1 + m.below  # lines of the CSV above its rows
     with to.open("wb") as out:
-        for line in done.lines(itertools.islice(cells_of_file(file, m.encoding, m.delimiter), head)):
+        lines = done.lines(itertools.islice(cells_of_file(file, m.encoding, m.delimiter), above))
+        for line in itertools.islice(lines, above):
             out.write(line.encode() + b"\n")
         places = [places[0] for _, _, _, places in done.read]
         factors = [c.factor for _, c, _, _ in done.read]
         layout = {"encoding": m.encoding, "delimiter": m.delimiter, "decimal": m.decimal}
-        return write_numbers(file, head, places, factors, out, **layout)
+        return write_numbers(file, m.head, places, factors, out, **layout)

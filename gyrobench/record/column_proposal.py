@@ -19,9 +19,9 @@ from pathlib import Path
 from gyrobench import units
 from gyrobench.bench import UsageError
 from gyrobench.record.clock_times import moment
-from gyrobench.record.column_map import BINARY, cells_of_file
 from gyrobench.record.csv_reader import DECIMAL_COMMA, regular
 from gyrobench.record.row_faults import NOTHING
+from gyrobench.record.text_cells import BINARY, cells_of_file, without_mark
 
 SAMPLE = 1 << 22  # bytes that are looked at
 LONG = 2000  # rows from which on a file is taken for time series
@@ -80,6 +80,7 @@ class FileColumn:
     time: str  # format
     empty: int
     rises: bool = False  # from row to row
+    shown: str = ""  # first values of a column without a name
 
     @property
     def exponents(self) -> object:
@@ -97,6 +98,7 @@ class FileLayout:
     below: int
     rows: int
     columns: tuple[FileColumn, ...]
+    names: bool = True  # it has a row of names
 
 
 def find_encoding(data: bytes) -> str:
@@ -120,7 +122,8 @@ def _share(cells: Sequence[str]) -> float:
 
 
 def find_layout(file: Path) -> FileLayout:
-    """Return the layout of a text file.  Raises UsageError where there is no table with names above it."""
+    """Return the layout of a text file.  Raises UsageError where there is no table of numbers, or names that are not as
+    many as its columns."""
     with regular(file).open("rb") as data:
         begin = data.read(SAMPLE)
     if begin.startswith(BINARY):
@@ -143,21 +146,25 @@ def find_layout(file: Path) -> FileLayout:
                 (k for a, k in enumerate(good) if good[a + 1 : a + 3] in ([], [k + 1], [k + 1, k + 2])), good[0]
             )
             best = score, delimiter, start, lines
-    if best is None or best[2] == 0:
+    if best is None:
         raise UsageError(f"{file}: no table of numbers with a row of names above it")
     _, delimiter, start, lines = best
     width = len(lines[start])
     below = int(start > 1 and len(lines[start - 2]) == width and _are_units(lines[start - 1]))
-    names = lines[start - 1 - below]
+    names = without_mark(lines[start - 1 - below]) if start else []
     if len(names) != width or _share(names) > 0.5:
-        raise UsageError(
-            f"{file}: {width} columns of numbers from row {start + 1} on, without a row of as many names above it: "
-            "write that row, with the same separator"
-        )
+        if len([c for c in names if c]) > 1:
+            raise UsageError(
+                f"{file}: {width} columns of numbers from row {start + 1} on, without a row of as many names above it: "
+                "write that row, with the same separator"
+            )
+        names, below = [], 0
     rows = [c for c in lines[start:] if len(c) == width]
     comma = delimiter != "," and any(DECIMAL_COMMA.fullmatch(c) for r in rows for c in r)
-    columns = _columns(names, lines[start - 1] if below else [], rows)
-    return FileLayout(encoding, delimiter, "," if comma else ".", start - 1 - below, below, len(rows), columns)
+    columns = _columns(names or [""] * width, lines[start - 1] if below else [], rows)
+    skip = start - 1 - below if names else start
+    decimal = "," if comma else "."
+    return FileLayout(encoding, delimiter, decimal, skip, below, len(rows), columns, bool(names))
 
 
 def _read_unit(text: str) -> str | None:
@@ -202,7 +209,9 @@ def _columns(names: Sequence[str], below: Sequence[str], rows: Sequence[Sequence
         time = next((f for f in FORMATS if dated and all(_fits(c, f) for c in cells[:200])), "")
         unit = "" if time else _read_unit(written) or ""
         source: str | int = text if names.count(text) == 1 and text else k + 1
-        found.append(FileColumn((source,), name, unit, written, time, len(rows) - len(cells), _rises(cells)))
+        shown = "" if any(names) else ", ".join(cells[:3])
+        empty = len(rows) - len(cells)
+        found.append(FileColumn((source,), name or f"column_{k + 1}", unit, written, time, empty, _rises(cells), shown))
     joined: list[FileColumn] = []
     for c in found:
         last = joined[-1] if joined else None

@@ -18,8 +18,8 @@ from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.errors import GyrobenchError
 from gyrobench.files import write_whole
 from gyrobench.reading import visible
-from gyrobench.record.column_map import cells_of_file
 from gyrobench.record.column_proposal import FileColumn
+from gyrobench.record.text_cells import cells_of_file
 from gyrobench.studio.frame import CopyLines, Studio, dropped, frame, given_in_address, inside, pairs_in_address, told
 from gyrobench.studio.request import KEPT, JobRequest
 from gyrobench.studio.words import content, heading, say, spoken

@@ -30,6 +30,7 @@ from gyrobench.workflow.empty_record import empty_record
 from gyrobench.workflow.inputs import load_test
 
 OPTIONAL = ("std", "n", "flagged")
+NO_NAMES = "names = false  # no row of names: columns by their numbers"
 KINDS = ("rad/s", "rad", "m/s2", "K")  # of the columns of a drift record, which has any names
 #: what columns without a unit are called -> unit that may be meant
 OTHER = r"(?!.*(time|stamp|_dt\b|count|clip|_id\b|status))"  # what belongs to a rate or force and is none
@@ -85,7 +86,8 @@ class ColumnProposal:
                 continue
             unused = ", ".join(f"'{c.name}'" for c in self.layout.columns if c not in self.found.values()) or "none"
             unit = self.wanted.get(name) or "deg/s"
-            entry = f'[columns.{name}] with from = "ITS NAME" and unit = "{unit}"'
+            source = '"ITS NAME"' if self.layout.names else "ITS NUMBER"
+            entry = f'[columns.{name}] with from = {source} and unit = "{unit}"'
             none = f"column '{name}': none of the file fits by name and unit"
             problems.append(f"{none}; write {entry}; not used so far: {unused}")
         return text, problems
@@ -170,6 +172,10 @@ def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[st
         if kind and name not in found and not (timed and name != "time"):
             found[name] = c
             wanted.append((name, kind))
+    rest = [c for c in layout.columns if c not in times]
+    if len(rest) == 1 and not set(found) - {"time"}:
+        found["rate"] = rest[0]  # the only one beside a time
+        wanted.append(("rate", "deg/s"))
     return found, wanted
 
 
@@ -185,8 +191,8 @@ def map_text(
         f"# Column map of {file.name}: gyrobench reduce {test.name} --data {shlex.quote(file.name)} --columns MAP",
         "# Check columns, units and signs (factor = -1 reverses one): names do not tell them all.",
         *([f"table = {_quoted(table)}"] if table else [] if is_log(file) else _text_keys(layout)),
-        f"skip = {layout.skip}  # lines above the names of the columns",
-        f"below = {layout.below}  # lines between names and rows",
+        f"skip = {layout.skip}  # lines above the {'names of the columns' if layout.names else 'rows'}",
+        *([f"below = {layout.below}  # lines between names and rows"] if layout.names else [NO_NAMES]),
         "# no value: missing (refused; a gap in time series), skip (leaves the row out), previous (as above)",
         f"empty = {_quoted('skip' if empty and not series else 'missing')}  # {empty} in the columns below",
     ]
@@ -200,10 +206,11 @@ def map_text(
             numbers = ", ".join(str(o.sources[0]) for o in others)
             problems.append(f"column {c.sources[0]} is taken for '{c.name}'; others are called so, too: {numbers}")
     used = {s for c in found.values() for s in c.sources}
-    unused = [c.name for c in layout.columns if not used & {*c.sources}]
+    unused = [c for c in layout.columns if not used & {*c.sources}]
     lines += [
         "",
-        f"# Not used: {', '.join(unused) or 'none'}",
+        f"# Not used: {', '.join(c.name for c in unused) or 'none'}",
+        *(f"# {c.name}: {c.shown} ..." for c in unused if c.shown),
         "#",
         "# [set]  # what the test needs to know, here or by --set",
     ]

@@ -109,7 +109,7 @@ def _fitting(system: System, data: Path) -> list[Advice]:
         layout, found = proposal.layout, proposal.found
         named = all(str(column.sources[0]).partition("[")[0].strip() == name for name, column in found.items())
         timed = any(column.time for column in found.values())
-        if not named or timed or layout.below or (found and read_head(data).line != layout.skip + 1):
+        if not (named and layout.names) or timed or layout.below or (found and read_head(data).line != layout.skip + 1):
             out = f"{data.stem}.toml"
             fit = shlex.join(["gyrobench", "fit", display_path(data), "--system", system.name, "--out", out])
             return [Advice("fit", f"the file has a layout of its own; {fit} proposes a column map for --columns")]
@@ -137,7 +137,7 @@ def _read_mapped(
         try:
             record = _read(measured, system, file, {**found.values(), **values}, feedback)
         except DataError as error:
-            raise DataError(data, [*problems, *error.problems]) from None
+            raise DataError(data, done.problems(error.problems)) from None
     if problems:
         raise DataError(data, problems)
     record.run.notes = [*record.run.notes, *done.notes()]

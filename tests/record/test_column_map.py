@@ -108,6 +108,8 @@ def test_encodings(encoding: str, tmp_path: Path) -> None:
         ("decimal = ','\n[columns.a]\nfrom = 1", "delimiter and decimal are both ','"),
         ("skip = '9'\n[columns.a]\nfrom = 1", "skip = '9': input should be a valid integer"),
         ("empty = 'drop'\n[columns.a]\nfrom = 1", "empty = 'drop': input should be 'missing', 'skip' or 'previous'"),
+        ("names = false\n[columns.a]\nfrom = 'x'", "columns.a: from: where names = false, the number of the column"),
+        ("names = false\nbelow = 1\n[columns.a]\nfrom = 1", "below: nothing stands between names and rows"),
         ("[columns.'a [s]']\nfrom = 1", "a name of the bench has no unit, comma or quote"),
     ],
 )
@@ -259,11 +261,50 @@ def test_proposal_takes_long_files_for_time_series(tmp_path: Path) -> None:
     assert problems == [] and "[columns.time]" in text and "[columns.current]" in text and "t_end" not in text
 
 
-@pytest.mark.parametrize("text", ["", "only words\nand more\n", "1,2\n3,4\n5,6\n", "a,b\n1,2,3\n4,5,6\n"])
+@pytest.mark.parametrize("text", ["", "only words\nand more\n", "a,b\n1,2,3\n4,5,6\n"])
 def test_files_without_a_table_are_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     with pytest.raises(UsageError, match=r"row of (names|as many names)"):
         find_layout(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("above", ["", "Logger 3\n", "# t x\n\n"])
+def test_a_file_without_names(above: str, tmp_path: Path, command: Any) -> None:
+    """Columns by their numbers, all rows read, as those of the same file with names."""
+    x = np.random.default_rng(2).normal(size=600).round(3).tolist()
+    rows = "".join(f"{k / 50:.2f}\t{v:.3f}\t21.{k % 2}\n" for k, v in enumerate(x))
+    file, bench_map = written(tmp_path / "log.txt", above + rows), tmp_path / "map.toml"
+    code, _, err = command("reduce", "drift_record", "--data", file)
+    assert code == 2 and "gyrobench fit" in err, err
+    _, err = command("fit", file, "--system", "drift_record", "--out", bench_map)[1:]
+    assert "from = ITS NUMBER" in err, err
+    text = bench_map.read_text(encoding="utf-8")
+    assert f"skip = {above.count(chr(10))}  #" in text and "names = false" in text
+    assert f"# column_2: {x[0]:.3f}, {x[1]:.3f}, {x[2]:.3f} ...\n" in text
+    assert '[columns.time]\nfrom = 1\n# unit = "s"' in text
+    written(bench_map, text.replace('# unit = "s"', 'unit = "s"') + '[columns.gx]\nfrom = 2\nunit = "deg/s"\n')
+    values = {"type_b": "none"}
+    outcome = reduce_measured(load_system("drift_record"), file, values, in_memory=True, columns=bench_map)
+    assert outcome.record.windows["gx"] == pytest.approx([v * 3.14159265358979 / 180.0 for v in x], rel=1e-12)
+    written(file, above + rows.replace("0.06", "0,06", 1))  # the fourth row
+    with pytest.raises(DataError) as refused:
+        reduce_measured(load_system("drift_record"), file, values, in_memory=True, columns=bench_map)
+    place, of_rows = refused.value.problems
+    assert f"row {above.count(chr(10)) + 5})" in place and "one more than in the file" in of_rows
+
+
+def test_a_record_of_one_column_is_a_rate(tmp_path: Path) -> None:
+    text, problems = proposed(tmp_path, "0.1\n0.3\n-0.2\n0.15\n", "drift_record")
+    assert '[columns.rate]\nfrom = 1\n# unit = "deg/s"' in text
+    assert [p.split(";")[0] for p in problems] == ["column 'rate': its unit: the file tells none"]
+
+
+def test_names_behind_the_mark_of_a_comment(tmp_path: Path) -> None:
+    """As numpy.savetxt writes them."""
+    text = "# time[s] gx[deg/s]\n" + "".join(f"{k} 0.{k}\n" for k in range(9))
+    lines, done = mapped(tmp_path, text, 'delimiter = " "\n[columns.gx]\nfrom = "gx[deg/s]"\nunit = "deg/s"\n')
+    assert [c.name for c in find_layout(written(tmp_path / "a.txt", text)).columns] == ["time", "gx"]
+    assert lines == ["gx [deg/s]", *(f"0.{k}" for k in range(9))] and not done.problems()
 
 
 def test_spreadsheets_are_refused_with_a_word(tmp_path: Path) -> None:
