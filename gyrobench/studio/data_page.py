@@ -138,6 +138,8 @@ def _preview(mapping: _Mapping) -> None:
     rows = []
     for number, cells in cells_of_file(mapping.proposal.text_file, layout.encoding, layout.delimiter):
         if number > layout.skip:
+            if not rows and not layout.names:
+                rows.append(["", *map(str, range(1, len(cells[:WIDE]) + 1))])
             rows.append([str(number), *cells[:WIDE]])
         if len(rows) > ROWS:
             break
