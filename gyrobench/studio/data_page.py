@@ -135,7 +135,7 @@ class _Mapping:
 def _preview(mapping: _Mapping) -> None:
     """Add the first rows of the file as they are."""
     layout = mapping.proposal.layout
-    rows = []
+    rows: list[list[str]] = []
     for number, cells in cells_of_file(mapping.proposal.text_file, layout.encoding, layout.delimiter):
         if number > layout.skip:
             if not rows and not layout.names:

@@ -77,17 +77,13 @@ class ColumnProposal:
     def text(self) -> tuple[str, list[str]]:
         """Return the text of the map, and what it lacks."""
         text, problems = map_text(self.file, self.test, self.layout, self.found, self.wanted, self.stated, self.table)
-        if "channel" in self.test.options:
-            names = [] if any(u not in ("s", "K", "degC") for u in self.wanted.values()) else ["rate"]
-        else:
-            names = [n for n in self.wanted if n not in self.found and n.split("_")[0] not in OPTIONAL]
-        for name in names:
+        for name in (n for n in self.wanted if n not in self.found and n.split("_")[0] not in OPTIONAL):
             if name == "t_end" and "t_start" in self.found:
                 continue
             unused = ", ".join(f"'{c.name}'" for c in self.layout.columns if c not in self.found.values()) or "none"
-            unit = self.wanted.get(name) or "deg/s"
             source = '"ITS NAME"' if self.layout.names else "ITS NUMBER"
-            entry = f'[columns.{name}] with from = {source} and unit = "{unit}"'
+            unit = f' and unit = "{self.wanted[name]}"' if self.wanted[name] not in ("", "1") else ""
+            entry = f"[columns.{name}] with from = {source}{unit}"
             none = f"column '{name}': none of the file fits by name and unit"
             problems.append(f"{none}; write {entry}; not used so far: {unused}")
         return text, problems
@@ -172,10 +168,10 @@ def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[st
         if kind and name not in found and not (timed and name != "time"):
             found[name] = c
             wanted.append((name, kind))
-    rest = [c for c in layout.columns if c not in times]
-    if len(rest) == 1 and not set(found) - {"time"}:
-        found["rate"] = rest[0]  # the only one beside a time
+    if all(u in ("s", "K", "degC") for _, u in wanted):
         wanted.append(("rate", "deg/s"))
+        if len(rest := [c for c in layout.columns if c not in found.values()]) == 1:
+            found["rate"] = rest[0]
     return found, wanted
 
 
