@@ -2,7 +2,7 @@
 
 Inside the bench every quantity is SI; degrees per hour, arc seconds, gram-force centimetres and milliamperes
 exist only at the surface.  A unit name is a product of symbols: ``rad/s/A``, ``kg.m2``, ``rad/s/sqrt(Hz)``,
-``deg/h/g2``.  ``.`` or ``*`` multiplies, ``/`` divides by the next symbol only, a trailing integer is a
+``deg/h/g2``.  ``.``, ``*`` or a blank multiplies, ``/`` divides by the next symbol only, a trailing integer is a
 power, ``sqrt( )`` halves the powers.  The printed forms (``°/h/g²``) are read too.
 
 The symbol ``g`` is the acceleration g0 = 9.80665 m/s2 ("per g").  Two old composites of the textbooks, where
@@ -111,6 +111,8 @@ _READ = {
     "·": ".",
     "²": "2",
     "³": "3",
+    "⁻": "-",
+    "¹": "1",
     "Ω": "Ohm",
     "^": "",
     "**": "",
@@ -123,6 +125,7 @@ def _clean(name: str) -> str:
     for printed, plain in _READ.items():
         text = text.replace(printed, plain)
     text = re.sub(r"√([A-Za-z]+)", r"sqrt(\1)", text)
+    text = re.sub(r"(?<=[A-Za-z0-9)])\s+(?=[A-Za-z])", ".", text)  # m s^-2 is no ms^-2
     return re.sub(r"\s+", "", text)
 
 

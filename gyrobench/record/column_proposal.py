@@ -45,6 +45,10 @@ ENDINGS = {
     "C": "degC", "c": "degC", "degC": "degC", "degc": "degC",
     "s": "s", "sec": "s", "ms": "ms", "us": "us", "ns": "ns",
 }  # fmt: skip
+#: what messages of ROS and PX4 call a quantity -> unit of their definition
+MESSAGES = {r"(.*\.)?angular_velocity[._].*|gyro_rad": "rad/s", r"(.*\.)?linear_acceleration[._].*": "m/s2"}
+#: since 1970, from 2001 to 2100 -> unit that such a number is in
+EPOCH = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 ENDING = re.compile(rf"(.*?[^_ .])[_ .]({'|'.join(sorted(ENDINGS, key=len, reverse=True))})")
 #: units whose sign means something else elsewhere (mg is milligauss, too) -> names that they count beside
 SAID = {"degC": r".*temp.*", **dict.fromkeys(("g", "mg"), r"(.*acc|.*beschl|[af]_?[xyz]).*")}
@@ -52,7 +56,7 @@ SAID = {"degC": r".*temp.*", **dict.fromkeys(("g", "mg"), r"(.*acc|.*beschl|[af]
 CALLED = {
     "t_start": r"t_?start|start|beginn|begin|von|from|zeit.*|time.*|datum.*|date.*|uhrzeit|t",
     "t_end": r"t_?end|ende?|bis|stop|to|until",
-    "time": r"time.*|zeit.*|datum.*|date.*|uhrzeit|ts?",
+    "time": r"time.*|.*stamp|zeit.*|datum.*|date.*|uhrzeit|ts?|seconds.*|elapsed.*",
     "phase": r"phase.*|lage.*|abschnitt.*|stellung.*",
     "day": r"day|tag",
     "mean": r"mean.*|mittel.*|strom.*|current.*|i|spannung.*|voltage.*",
@@ -181,6 +185,8 @@ def _read_unit(text: str) -> str | None:
 
 def _unit_at_end(text: str) -> tuple[str, str]:
     """Return a name, and the unit that it ends with, "" for none: one that the name does not contradict."""
+    if known := next((u for pattern, u in MESSAGES.items() if re.fullmatch(pattern, text)), ""):
+        return text.removesuffix("_rad"), known
     if match := ENDING.fullmatch(text):
         name, unit = match[1], ENDINGS[match[2]]
         said = CALLED["time"] if units.same_dimension(unit, "s") else SAID.get(unit, ".*")
@@ -197,16 +203,20 @@ def _are_units(cells: Sequence[str]) -> bool:
 def _columns(names: Sequence[str], below: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[FileColumn, ...]:
     found = []
     for k, text in enumerate(names):
-        match = WITH_UNIT.fullmatch(text)
+        index = re.fullmatch(r"(.*)\[([012])\]", text)  # a vector: gyro_rad[0]
+        match = None if index else WITH_UNIT.fullmatch(text)
         written = next((g for g in match.groups()[1:] if g), "") if match else ""
-        name = match[1] if match and match[1] else text
+        name = index[1] if index else (match[1] if match and match[1] else text).lstrip("#% ").removeprefix("field.")
         if below:
             written = below[k] or written
         elif not written:
             name, written = _unit_at_end(name)
+        name += f"_{'xyz'[int(index[2])]}" if index else ""
         cells = [r[k] for r in rows if r[k] not in NOTHING]
         dated = cells and not NUMBER.fullmatch(cells[0])  # no form of a date or clock time is a number
         time = next((f for f in FORMATS if dated and all(_fits(c, f) for c in cells[:200])), "")
+        if not (written or time) and re.fullmatch(CALLED["time"], _plain(name)):
+            written = _epoch(cells)
         unit = "" if time else _read_unit(written) or ""
         source: str | int = text if names.count(text) == 1 and text else k + 1
         shown = "" if any(names) else ", ".join(cells[:3])
@@ -221,6 +231,14 @@ def _columns(names: Sequence[str], below: Sequence[str], rows: Sequence[Sequence
         else:
             joined.append(c)
     return tuple(joined)
+
+
+def _epoch(cells: Sequence[str]) -> str:
+    """Return the unit of times since 1970, "" of other numbers."""
+    with suppress(ValueError, IndexError):
+        first, last = float(cells[0]), float(cells[-1])
+        return next((u for u, f in EPOCH.items() if 1e9 * f <= first <= last < 4.1e9 * f), "")
+    return ""
 
 
 def _rises(cells: Sequence[str]) -> bool:

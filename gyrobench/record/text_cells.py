@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from gyrobench.record.csv_reader import DataError, regular
 
 BINARY_KINDS = {b"PK": "a spreadsheet or an archive", b"PA": "a Parquet file", b"\xd0\xcf": "an old spreadsheet"}
 BINARY = tuple(BINARY_KINDS)
+CHECKSUM = re.compile(r"\*[0-9A-Fa-f]{2,4}\s*$")  # of a sentence of NMEA 0183: $VNYMR,...*6F
 
 
 def without_mark(names: list[str]) -> list[str]:
@@ -30,6 +32,8 @@ def cells_of_file(file: Path, encoding: str, delimiter: str) -> Iterator[tuple[i
         with file.open(encoding=codec) as lines:
             for number, line in enumerate(lines, 1):
                 text = line.rstrip("\n")
+                if text.startswith("$"):
+                    text = CHECKSUM.sub("", text)
                 if delimiter == " ":
                     yield number, text.split()
                 elif '"' in text:

@@ -35,7 +35,7 @@ KINDS = ("rad/s", "rad", "m/s2", "K")  # of the columns of a drift record, which
 #: what columns without a unit are called -> unit that may be meant
 OTHER = r"(?!.*(time|stamp|_dt\b|count|clip|_id\b|status))"  # what belongs to a rate or force and is none
 LIKELY = {
-    OTHER + r"(([xyz]_)?gyr.*|omega.*|w_?[xyz]|(dreh)?rat.*)": "deg/s",
+    OTHER + r"(([xyz]_)?gyr.*|omega.*|[gw]_?[xyz]|(dreh)?rat.*)": "deg/s",
     OTHER + r"(([xyz]_)?acc.*|beschl.*|[af]_?[xyz])": "m/s2",
     r".*temp.*": "degC",
 }
@@ -168,6 +168,11 @@ def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[st
         if kind and name not in found and not (timed and name != "time"):
             found[name] = c
             wanted.append((name, kind))
+    if all(u in ("s", "K", "degC") for _, u in wanted):
+        axes = {c.name: c for c in layout.columns if c.name in ("x", "y", "z") and not c.unit}
+        if len(axes) == 3:
+            found |= axes
+            wanted += [(name, "deg/s") for name in axes]
     if all(u in ("s", "K", "degC") for _, u in wanted):
         wanted.append(("rate", "deg/s"))
         if len(rest := [c for c in layout.columns if c not in found.values()]) == 1:

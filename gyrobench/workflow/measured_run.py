@@ -107,7 +107,10 @@ def _fitting(system: System, data: Path) -> list[Advice]:
     with suppress(GyrobenchError):
         proposal = propose_columns(data, system.name)
         layout, found = proposal.layout, proposal.found
-        named = all(str(column.sources[0]).partition("[")[0].strip() == name for name, column in found.items())
+        named = all(
+            str(c.sources[0]).partition("[")[0].strip() == name and (c.unit or proposal.wanted[name] in ("", "1"))
+            for name, c in found.items()
+        )
         timed = any(column.time for column in found.values())
         if not (named and layout.names) or timed or layout.below or (found and read_head(data).line != layout.skip + 1):
             out = f"{data.stem}.toml"

@@ -1,0 +1,90 @@
+"""Column maps that are proposed for files as common loggers write them: names, units, times since 1970, sentences."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gyrobench import units
+from gyrobench.record.column_map import read_map, translate
+from gyrobench.record.column_proposal import find_layout
+from gyrobench.record.text_cells import cells_of_file
+from gyrobench.workflow.fit_columns import write_columns
+
+STAMP = 1603372452123456789  # ns since 1970
+G, A = ("rad/s",) * 3, ("m/s2",) * 3
+
+
+def spelled(name: str, names: str = "xyz") -> list[str]:
+    return [name.replace("?", a) for a in names]
+
+
+LOGGERS: dict[str, tuple[str, list[str]]] = {  # kind -> header, columns of the map after time
+    "EuRoC": (
+        "#timestamp [ns]," + ",".join(spelled("w_RS_S_? [rad s^-1]") + spelled("a_RS_S_? [m s^-2]")),
+        spelled("w_RS_S_?") + spelled("a_RS_S_?"),
+    ),
+    "rostopic": (
+        "%time," + ",".join(spelled("field.angular_velocity.?") + spelled("field.linear_acceleration.?")),
+        spelled("angular_velocity_?") + spelled("linear_acceleration_?"),
+    ),
+    "ulog": (
+        "timestamp," + ",".join(spelled("gyro_rad[?]", "012") + spelled("accelerometer_m_s2[?]", "012")),
+        spelled("gyro_?") + spelled("accelerometer_?"),
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", LOGGERS)
+def test_a_file_needs_no_hand(kind: str, tmp_path: Path) -> None:
+    """Six channels in their units, times in the unit that their size tells: 1.6e18 is 2020 in nanoseconds."""
+    header, names = LOGGERS[kind]
+    values = np.random.default_rng(3).normal(size=(20, 6)).round(6)
+    rows = [f"{STAMP + 10_000_000 * k}," + ",".join(map(str, v)) for k, v in enumerate(values.tolist())]
+    (tmp_path / "log.csv").write_text("\n".join([header, *rows, ""]), encoding="utf-8")
+    _, problems = write_columns(tmp_path / "log.csv", "drift_record", tmp_path / "map.toml")
+    found = read_map(tmp_path / "map.toml")
+    assert problems == [] and list(found.columns) == ["time", *names]
+    assert found.columns["time"].unit == "ns"
+    for name, unit in zip(names, G + A, strict=True):
+        assert units.factor(found.columns[name].unit) == 1.0 and units.same_dimension(found.columns[name].unit, unit)
+    translate(tmp_path / "log.csv", found, tmp_path / "out.csv")
+    lines = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()
+    np.testing.assert_array_equal([[float(c) for c in line.split(",")[1:]] for line in lines[1:]], values)
+
+
+@pytest.mark.parametrize(
+    ("first", "unit"),
+    [("1603372452.5", "s"), ("1603372452500", "ms"), ("1603372452500000", "us"), ("1200", ""), ("946684", "")],
+)
+def test_the_unit_of_times_since_1970(first: str, unit: str, tmp_path: Path) -> None:
+    """2020 in each unit; numbers that are no such time tell none."""
+    rows = "".join(f"{float(first) + k:.1f},{k % 3}\n" for k in range(12))
+    (tmp_path / "log.csv").write_text(f"timestamp,gx\n{rows}", encoding="utf-8")
+    assert find_layout(tmp_path / "log.csv").columns[0].unit == unit
+
+
+def test_sentences_with_a_checksum(tmp_path: Path) -> None:
+    """Of NMEA 0183; a remark in a cell stays what it is."""
+    (tmp_path / "vn.txt").write_text("$VNYMR,+0.5,-0.25*6F\n$VNYMR,+0.5,-0.5*0a\r\n1,2,3*6F\n", encoding="utf-8")
+    rows = [cells for _, cells in cells_of_file(tmp_path / "vn.txt", "utf-8", ",")]
+    assert rows == [["$VNYMR", "+0.5", "-0.25"], ["$VNYMR", "+0.5", "-0.5"], ["1", "2", "3*6F"]]
+
+
+def test_axes_of_a_phone(tmp_path: Path, command: Any) -> None:
+    """One sensor a file, no units: each axis is asked for, and `reduce` points to `fit`."""
+    rows = "".join(f"{STAMP + 10_000_000 * k},{0.01 * k},{k % 3},{k % 5},{k % 7}\n" for k in range(20))
+    (tmp_path / "Gyroscope.csv").write_text(f"time,seconds_elapsed,z,y,x\n{rows}", encoding="utf-8")
+    _, problems = write_columns(tmp_path / "Gyroscope.csv", "drift_record", None)
+    assert [p.split(";")[0] for p in problems] == [f"column '{a}': its unit: the file tells none" for a in "zyx"]
+    code, _, err = command("reduce", "drift_record", "--data", tmp_path / "Gyroscope.csv")
+    assert code == 2 and "gyrobench fit" in err, err
+
+
+def test_a_blank_between_units_multiplies() -> None:
+    """m s^-2 is no power of the millisecond, m N no millinewton."""
+    assert units.unit("m s^-2").exponents == units.unit("rad s⁻¹ m/s/rad").exponents == units.unit("m/s2").exponents
+    assert units.unit("m N").exponents == units.unit("N.m").exponents and units.factor("g cm") == units.factor("g.cm")
