@@ -69,8 +69,8 @@ CALLED = {
     "flag": r"flag.*|g[uü]ltig.*",
     "n": r"n|anzahl.*|count.*",
 }  # fmt: skip
-CALLED |= {f"g{a}": rf"(gyro\w*|gyr|g|omega|w|rate|dreh\w*)_?{a}" for a in "xyz"}
-CALLED |= {f"a{a}": rf"(acc\w*|a|f|beschl\w*)_?{a}" for a in "xyz"}
+CALLED |= {f"g{a}": rf"(gyro\w*|gyr|g|omega|angular\w*|w|w_rs_s|rate|dreh\w*)_?{a}" for a in "xyz"}
+CALLED |= {f"a{a}": rf"(acc\w*|linear_acc\w*|a|a_rs_s|f|beschl\w*)_?{a}" for a in "xyz"}
 
 
 @dataclass(frozen=True)
