@@ -334,7 +334,8 @@ class MappedRows:
     def problems(self, of_reader: Sequence[str] = ()) -> list[str]:
         """Return what was wrong, each with its rows, before what the reader of the lines found."""
         own = [f"{row_list(rows)}: '{text[:60]}': {what}" for what, (text, rows) in self.faults.items()]
-        return [*own, *of_reader, *([ONE_MORE] if of_reader and not self.map.names else [])]
+        counted = not self.map.names and any(re.search(r"\brows? \d", p) for p in of_reader)
+        return [*own, *of_reader, *([ONE_MORE] if counted else [])]
 
     def notes(self) -> list[str]:
         """Return what was left out, for the report."""

@@ -56,7 +56,7 @@ SAID = {"degC": r".*temp.*", **dict.fromkeys(("g", "mg"), r"(.*acc|.*beschl|[af]
 CALLED = {
     "t_start": r"t_?start|start|beginn|begin|von|from|zeit.*|time.*|datum.*|date.*|uhrzeit|t",
     "t_end": r"t_?end|ende?|bis|stop|to|until",
-    "time": r"time.*|.*stamp|zeit.*|datum.*|date.*|uhrzeit|ts?|seconds.*|elapsed.*",
+    "time": r"time.*|.*stamp|zeit.*|datum.*|date.*|uhrzeit|x_value|ts?|seconds.*|elapsed.*",
     "phase": r"phase.*|lage.*|abschnitt.*|stellung.*",
     "day": r"day|tag",
     "mean": r"mean.*|mittel.*|strom.*|current.*|i|spannung.*|voltage.*",
@@ -146,29 +146,53 @@ def find_layout(file: Path) -> FileLayout:
         good = [k for k in numeric if len(lines[k]) == width]
         score = sum(shares[k] for k in good) * (1.0 if width > 1 else 0.5)
         if good and (best is None or score > best[0] * 1.0001):
-            start = next(
-                (k for a, k in enumerate(good) if good[a + 1 : a + 3] in ([], [k + 1], [k + 1, k + 2])), good[0]
-            )
+            start = _first_row(good, lines)
             best = score, delimiter, start, lines
     if best is None:
         raise UsageError(f"{file}: no table of numbers with a row of names above it")
     _, delimiter, start, lines = best
     width = len(lines[start])
-    below = int(start > 1 and len(lines[start - 2]) == width and _are_units(lines[start - 1]))
-    names = without_mark(lines[start - 1 - below]) if start else []
-    if len(names) != width or _share(names) > 0.5:
+    at, of_units = _rows_above(lines, start, width)
+    names = without_mark(lines[at]) if at >= 0 else []
+    more = len(names) == width + 1  # a remark that no row has
+    if len(names) != width + more or _share(names) > 0.5:
         if len([c for c in names if c]) > 1:
             raise UsageError(
                 f"{file}: {width} columns of numbers from row {start + 1} on, without a row of as many names above it: "
                 "write that row, with the same separator"
             )
-        names, below = [], 0
+        names = []
     rows = [c for c in lines[start:] if len(c) == width]
     comma = delimiter != "," and any(DECIMAL_COMMA.fullmatch(c) for r in rows for c in r)
-    columns = _columns(names or [""] * width, lines[start - 1] if below else [], rows)
-    skip = start - 1 - below if names else start
+    numbered = more or not names
+    columns = _columns(names[:width] or [""] * width, lines[of_units] if of_units >= 0 else [], rows, numbered)
+    skip, below = (start, 0) if numbered else (at, start - at - 1)
     decimal = "," if comma else "."
-    return FileLayout(encoding, delimiter, decimal, skip, below, len(rows), columns, bool(names))
+    return FileLayout(encoding, delimiter, decimal, skip, below, len(rows), columns, not numbered)
+
+
+def _first_row(good: Sequence[int], lines: Sequence[Sequence[str]]) -> int:
+    """Return the first row of numbers: of three with numbers where most rows have them, or numbers right above."""
+    usual = Counter(tuple(_share([c]) > 0.0 for c in lines[k]) for k in good).most_common(1)[0][0]
+    like = [
+        k for k in good if all(c in NOTHING or _share([c]) > 0.0 for c, u in zip(lines[k], usual, strict=True) if u)
+    ]
+    start = next((k for a, k in enumerate(like) if like[a + 1 : a + 3] in ([], [k + 1], [k + 1, k + 2])), like[0])
+    while start - 1 in good:
+        start -= 1
+    return start
+
+
+def _rows_above(lines: Sequence[list[str]], start: int, width: int) -> tuple[int, int]:
+    """Return the row of names above the first row of numbers, and that of units, -1 for none.
+
+    Names stand above units, which may have a row of remarks below them.
+    """
+    above = [k for k in range(start - 1, max(start - 6, -1), -1) if any(lines[k])]
+    for k, over in pairwise(above[:4]):
+        if _are_units(lines[k]) and all(len(without_mark(lines[r])) == width for r in (k, over)):
+            return over, k
+    return (above[0] if above else -1), -1
 
 
 def _read_unit(text: str) -> str | None:
@@ -197,10 +221,12 @@ def _unit_at_end(text: str) -> tuple[str, str]:
 
 def _are_units(cells: Sequence[str]) -> bool:
     found = [_read_unit("" if FORM_OF_TIME.fullmatch(c) else c) for c in cells]
-    return any(found) and all(f is not None for f in found)
+    return _share(cells) <= 0.5 and any(found) and all(f is not None for f in found)
 
 
-def _columns(names: Sequence[str], below: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[FileColumn, ...]:
+def _columns(
+    names: Sequence[str], below: Sequence[str], rows: Sequence[Sequence[str]], numbered: bool
+) -> tuple[FileColumn, ...]:
     found = []
     for k, text in enumerate(names):
         index = re.fullmatch(r"(.*)\[([012])\]", text)  # a vector: gyro_rad[0]
@@ -218,7 +244,7 @@ def _columns(names: Sequence[str], below: Sequence[str], rows: Sequence[Sequence
         if not (written or time) and re.fullmatch(CALLED["time"], _plain(name)):
             written = _epoch(cells)
         unit = "" if time else _read_unit(written) or ""
-        source: str | int = text if names.count(text) == 1 and text else k + 1
+        source: str | int = text if names.count(text) == 1 and text and not numbered else k + 1
         shown = "" if any(names) else ", ".join(cells[:3])
         empty = len(rows) - len(cells)
         found.append(FileColumn((source,), name or f"column_{k + 1}", unit, written, time, empty, _rises(cells), shown))

@@ -77,6 +77,8 @@ class ColumnProposal:
     def text(self) -> tuple[str, list[str]]:
         """Return the text of the map, and what it lacks."""
         text, problems = map_text(self.file, self.test, self.layout, self.found, self.wanted, self.stated, self.table)
+        if "sampling" in self.stated:
+            problems.append('no column of times: write [columns.time], or sampling = "100Hz" below [set]')
         for name in (n for n in self.wanted if n not in self.found and n.split("_")[0] not in OPTIONAL):
             if name == "t_end" and "t_start" in self.found:
                 continue
@@ -120,6 +122,8 @@ def _proposal(file: Path, test: System | Suite, table: str, text: Path) -> Colum
         samples = _of_header(test.measured_data.samples) if isinstance(test, System) and test.measured_data else []
         if len(of_samples := match_columns(samples, layout)) > len(found):
             found, wanted, stated = of_samples, samples, {"attitudes": "unknown", **stated}
+    if "channel" in test.options and "time" not in found:
+        stated = {"sampling": "100Hz", **stated}
     others = [c for c in layout.columns if c not in found.values() and c.unit and _is(c, "K")]
     for k, c in enumerate(others):
         found[f"temperature {k + 1}" if k else "temperature"] = c

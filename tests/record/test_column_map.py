@@ -228,9 +228,9 @@ def test_proposal_for_columns_without_units(tmp_path: Path) -> None:
         f"column '{n}': its unit: the file tells none" for n in ("time", "gyro_x", "acc_x", "temperature")
     ]
     _, problems = proposed(tmp_path, "a,b\n1,2\n3,4\n", "drift_record")
-    none, entry, unused = problems[0].split("; ")
+    none, entry, unused = problems[1].split("; ")
     assert (none, unused) == ("column 'rate': none of the file fits by name and unit", "not used so far: 'a', 'b'")
-    assert entry == 'write [columns.rate] with from = "ITS NAME" and unit = "deg/s"' and len(problems) == 1
+    assert entry == 'write [columns.rate] with from = "ITS NAME" and unit = "deg/s"' and len(problems) == 2
 
 
 def test_a_temperature_is_not_blamed_for_a_rate_without_unit(tmp_path: Path) -> None:
@@ -296,7 +296,10 @@ def test_a_file_without_names(above: str, tmp_path: Path, command: Any) -> None:
 def test_a_record_of_one_column_is_a_rate(tmp_path: Path) -> None:
     text, problems = proposed(tmp_path, "0.1\n0.3\n-0.2\n0.15\n", "drift_record")
     assert '[columns.rate]\nfrom = 1\n# unit = "deg/s"' in text
-    assert [p.split(";")[0] for p in problems] == ["column 'rate': its unit: the file tells none"]
+    assert [p.split(";")[0] for p in problems] == [
+        "column 'rate': its unit: the file tells none",
+        'no column of times: write [columns.time], or sampling = "100Hz" below [set]',
+    ]
 
 
 def test_names_behind_the_mark_of_a_comment(tmp_path: Path) -> None:

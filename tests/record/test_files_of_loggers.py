@@ -80,6 +80,40 @@ def test_sentences_with_a_checksum(tmp_path: Path) -> None:
     assert rows == [["$VNYMR", "+0.5", "-0.25"], ["$VNYMR", "+0.5", "-0.5"], ["1", "2", "3*6F"]]
 
 
+HEADS: dict[str, tuple[str, tuple[int, int, bool], list[tuple[str | int, str, str]]]] = {
+    # head -> lines above the names, between names and rows, whether rows have names; columns
+    "LabVIEW": (  # numbers in the head, and a name more than the rows have cells
+        "LabVIEW Measurement\t\nTime\t09:12:33.12\n***End_of_Header***\t\n\t\nChannels\t2\t\t\nSamples\t3000\t3000\t\n"
+        "Date\t2024/03/05\t2024/03/05\t\nTime\t09:12:33.12\t09:12:33.12\t\nX0\t0.0E+0\t0.0E+0\t\n"
+        "***End_of_Header***\t\t\t\nX_Value\tGyroX\tGyroY\tComment\n",
+        (11, 0, False),
+        [(1, "X_Value", ""), (2, "GyroX", ""), (3, "GyroY", "")],
+    ),
+    "oscilloscope": (  # units and an empty line below the names
+        "Time\tChannel A\tChannel B\n(ms)\t(V)\t(mV)\n\n",
+        (0, 2, True),
+        [("Time", "Time", "ms"), ("Channel A", "Channel A", "V"), ("Channel B", "Channel B", "mV")],
+    ),
+    "amplifier": (  # a row of remarks below the units
+        "Catman\nKanäle: 3\n\nZeit  1 - Standardrate\tGyro_X\tTemperatur\ns\t°/h\t°C\n1/1/2024\tKal: 2023\tPT100\n",
+        (3, 2, True),
+        [("Zeit  1 - Standardrate", "Zeit  1 - Standardrate", "s"), ("Gyro_X", "Gyro_X", "°/h"),
+         ("Temperatur", "Temperatur", "degC")],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", HEADS)
+def test_heads_of_other_programs(kind: str, tmp_path: Path) -> None:
+    """All rows are read, from the first on."""
+    head, layout, columns = HEADS[kind]
+    rows = "".join(f"{k / 100:.2f}\t{k % 7}.5\t{20 + k % 3}\n" for k in range(40))
+    (tmp_path / "log.txt").write_text(head + rows, encoding="utf-8")
+    found = find_layout(tmp_path / "log.txt")
+    assert (found.skip, found.below, found.names) == layout and found.rows == 40
+    assert [(c.sources[0], c.name, c.unit) for c in found.columns] == columns
+
+
 def test_axes_of_a_phone(tmp_path: Path, command: Any) -> None:
     """One sensor a file, no units: each axis is asked for, and `reduce` points to `fit`."""
     rows = "".join(f"{STAMP + 10_000_000 * k},{0.01 * k},{k % 3},{k % 5},{k % 7}\n" for k in range(20))
