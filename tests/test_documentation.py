@@ -108,6 +108,11 @@ def test_the_changelog_begins_with_this_version() -> None:
         assert bullet.count("\n") <= 2, bullet
 
 
+def test_the_citation_is_of_this_version() -> None:
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert re.findall(r"^(version|license): (\S+)$", text, re.M) == [("version", VERSION), ("license", "BSD-3-Clause")]
+
+
 def test_public_names_have_docstrings() -> None:
     assert [name for name in gb.__all__ if not (getattr(gb, name).__doc__ or "").strip()] == []
 
