@@ -245,7 +245,7 @@ def _columns(
             written = _epoch(cells)
         unit = "" if time else _read_unit(written) or ""
         source: str | int = text if names.count(text) == 1 and text and not numbered else k + 1
-        shown = "" if any(names) else ", ".join(cells[:3])
+        shown = "" if name and not re.fullmatch(r"column_\d+", name) else ", ".join(cells[:3])
         empty = len(rows) - len(cells)
         found.append(FileColumn((source,), name or f"column_{k + 1}", unit, written, time, empty, _rises(cells), shown))
     joined: list[FileColumn] = []

@@ -76,8 +76,11 @@ WINDOW_COLUMNS = (
 
 
 def regular(file: Path) -> Path:
-    """Return a file.  Raises DataError for a pipe or a device."""
-    return require_regular(Path(file), lambda text: DataError(file, [text]))
+    """Return a file.  Raises DataError for a pipe or a device, and for the pointer of Git LFS in place of a file."""
+    found = require_regular(Path(file), lambda text: DataError(file, [text]))
+    if found.is_file() and found.stat().st_size < 400 and found.read_bytes().startswith(b"version https://git-lfs"):
+        raise DataError(file, ["a pointer of Git LFS, not the file; git lfs pull brings it"])
+    return found
 
 
 def for_arrow(file: Path) -> Any:

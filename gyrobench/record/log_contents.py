@@ -218,6 +218,32 @@ def _excel(file: Path) -> Tables:
         yield sheet.title, lambda sheet=sheet: {"": [list(r) for r in sheet.iter_rows(values_only=True)]}  # type: ignore[misc]
 
 
+def flat_width(file: Path) -> int:
+    """Return how many numbers a row has of a file of 8-byte numbers, the first of each row a time; 0 of any other."""
+    import numpy as np
+
+    size = file.stat().st_size
+    with file.open("rb") as data:
+        begin = data.read(1 << 16)
+    if size % 8 or b"\0" not in begin:
+        return 0
+    values = np.frombuffer(begin[: len(begin) // 8 * 8], "<f8")
+    if not (np.abs(values) < 1e12).all():
+        return 0
+    for width in (w for w in range(2, 33) if size % (8 * w) == 0 and len(values) >= 20 * w):
+        steps = np.diff(values[: len(values) // width * width : width])
+        if steps.min() > 0.0 and steps.max() < 10.0 * np.median(steps):
+            return width
+    return 0
+
+
+def _flat(file: Path) -> Tables:
+    import numpy as np
+
+    rows = np.fromfile(file, "<f8").reshape(-1, flat_width(file))
+    yield "rows", lambda: {f"column_{k + 1}": rows[:, k] for k in range(rows.shape[1])}
+
+
 READERS: dict[str, Callable[[Path], Tables]] = {
     ".parquet": _parquet, ".feather": _parquet, ".arrow": _parquet, ".npy": _numpy, ".npz": _numpy, ".mat": _mat,
     ".h5": _hdf5, ".hdf5": _hdf5, ".mf4": _mdf, ".mdf": _mdf, ".tdms": _tdms, ".ulg": _ulog, ".bag": _bag,
@@ -264,7 +290,7 @@ def main() -> None:
     file = Path(sys.argv[1])
     try:
         with contextlib.redirect_stdout(sys.stderr):  # what readers say of their own
-            tables = list(READERS[file.suffix.lower()](file))
+            tables = list(READERS.get(file.suffix.lower(), _flat)(file))
             wanted = sys.argv[2] if len(sys.argv) == 4 else None
             for name, columns in tables:
                 if name == wanted or (wanted == "" and len(tables) == 1):

@@ -2,7 +2,8 @@
 
 Parquet, Feather, NumPy and MATLAB 5 need no further package; MATLAB 7.3, HDF5, MDF4, TDMS, ULog, ROS bags, MCAP and
 Excel those of ``gyrobench[logs]``.  Names carry their unit where the format has one (``gyro_x [rad/s]``); dates become
-seconds since the first row.  The file is read by a process of its own (:mod:`gyrobench.record.log_contents`).
+seconds since the first row.  Files of 8-byte numbers alone, a time first in each row, are told by their content.
+The file is read by a process of its own (:mod:`gyrobench.record.log_contents`).
 
 Not modelled: rows of several tables side by side; messages of more than 36 numbers in an array.
 """
@@ -18,14 +19,14 @@ from gyrobench.bench import suggest_names
 from gyrobench.files import temporary_folder
 from gyrobench.reading import LARGEST
 from gyrobench.record.csv_reader import DataError, regular
-from gyrobench.record.log_contents import MISSING, READERS
+from gyrobench.record.log_contents import MISSING, READERS, flat_width
 
 MOST = 32 * LARGEST  # bytes
 
 
 def is_log(file: Path) -> bool:
-    """Return whether a file is of one of the formats, by the end of its name."""
-    return file.suffix.lower() in READERS and file.is_file()
+    """Return whether a file is of one of the formats, by the end of its name, or nothing but numbers of 8 bytes."""
+    return file.is_file() and (file.suffix.lower() in READERS or flat_width(file) > 0)
 
 
 def tables_of(file: Path) -> list[str]:

@@ -11,6 +11,7 @@ import pytest
 from gyrobench import units
 from gyrobench.record.column_map import read_map, translate
 from gyrobench.record.column_proposal import find_layout
+from gyrobench.record.log_files import as_text, is_log
 from gyrobench.record.text_cells import cells_of_file
 from gyrobench.workflow.fit_columns import write_columns
 
@@ -122,6 +123,29 @@ def test_axes_of_a_phone(tmp_path: Path, command: Any) -> None:
     assert [p.split(";")[0] for p in problems] == [f"column '{a}': its unit: the file tells none" for a in "zyx"]
     code, _, err = command("reduce", "drift_record", "--data", tmp_path / "Gyroscope.csv")
     assert code == 2 and "gyrobench fit" in err, err
+
+
+def test_numbers_of_eight_bytes(tmp_path: Path, command: Any) -> None:
+    """A time and six channels a row; what has no time first, or a rest, is no such file."""
+    values = np.random.default_rng(4).normal(size=(300, 7))
+    values[:, 0] = 270000.0 + np.arange(300) / 64.0
+    file = tmp_path / "flight.ins"
+    values.astype("<f8").tofile(file)
+    assert "[columns.time]" in write_columns(file, "drift_record", None)[0]
+    np.testing.assert_array_equal(np.loadtxt(as_text(file), delimiter=",", skiprows=1), values)
+    file.write_bytes(file.read_bytes()[:-4])
+    assert not is_log(file)
+    values[::-1].astype("<f8").tofile(file)
+    assert not is_log(file)
+    np.ones((300, 7)).astype("<u4").tofile(file)
+    assert not is_log(file)
+
+
+def test_a_pointer_of_git_lfs(tmp_path: Path, command: Any) -> None:
+    (tmp_path / "a.csv").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 1\n")
+    for line in ("reduce", "drift_record", "--data"), ("fit", "--system", "drift_record"):
+        code, _, err = command(*line, tmp_path / "a.csv")
+        assert code == 2 and "git lfs pull brings it" in err, err
 
 
 def test_a_blank_between_units_multiplies() -> None:
