@@ -154,17 +154,16 @@ def find_layout(file: Path) -> FileLayout:
     width = len(lines[start])
     at, of_units = _rows_above(lines, start, width)
     names = without_mark(lines[at]) if at >= 0 else []
-    more = len(names) == width + 1  # a remark that no row has
-    if len(names) != width + more or _share(names) > 0.5:
-        if len([c for c in names if c]) > 1:
+    if _share(names) > 0.0 or len(names) not in (width, width + 1):  # one more: a remark that no row has
+        if len(names) == width - 1 > 1 and not _share(names):
             raise UsageError(
                 f"{file}: {width} columns of numbers from row {start + 1} on, without a row of as many names above it: "
                 "write that row, with the same separator"
             )
-        names = []
+        names = []  # a title, or nothing
     rows = [c for c in lines[start:] if len(c) == width]
     comma = delimiter != "," and any(DECIMAL_COMMA.fullmatch(c) for r in rows for c in r)
-    numbered = more or not names
+    numbered = len(names) != width
     columns = _columns(names[:width] or [""] * width, lines[of_units] if of_units >= 0 else [], rows, numbered)
     skip, below = (start, 0) if numbered else (at, start - at - 1)
     decimal = "," if comma else "."
@@ -172,13 +171,14 @@ def find_layout(file: Path) -> FileLayout:
 
 
 def _first_row(good: Sequence[int], lines: Sequence[Sequence[str]]) -> int:
-    """Return the first row of numbers: of three with numbers where most rows have them, or numbers right above."""
+    """Return the first row of numbers: of three with numbers where most rows have them, or above those with half."""
     usual = Counter(tuple(_share([c]) > 0.0 for c in lines[k]) for k in good).most_common(1)[0][0]
     like = [
         k for k in good if all(c in NOTHING or _share([c]) > 0.0 for c, u in zip(lines[k], usual, strict=True) if u)
     ]
     start = next((k for a, k in enumerate(like) if like[a + 1 : a + 3] in ([], [k + 1], [k + 1, k + 2])), like[0])
-    while start - 1 in good:
+    first = usual.index(True)
+    while start and len(above := lines[start - 1]) == len(usual) and _share(above) >= 0.5 and _share([above[first]]):
         start -= 1
     return start
 
