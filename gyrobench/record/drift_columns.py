@@ -30,9 +30,13 @@ Blocks = Iterator[dict[str, Array]]
 TIME, FLAG = "time", "flag"
 ROWS = 1 << 18  # of a block of a Parquet file
 BUFFER = 1 << 20  # bytes of a column read at a time
-RATE, ANGLE, INCREMENT, FORCE = "rate", "angle", "increment", "force"
+RATE, ANGLE, FORCE = "rate", "angle", "force"
 KINDS = {RATE: "rad/s", ANGLE: "rad", FORCE: "m/s2"}
+INCREMENT, VELOCITY = "angle of each sample", "velocity of each sample"
+INCREMENTS = {RATE: "rad/s", INCREMENT: "rad", FORCE: "m/s2", VELOCITY: "m/s"}
 DIRECT = (RATE, FORCE)  # what a sample reads is analysed, not its differences
+#: how the angle, or the velocity, of each sample is called
+OF_EACH = re.compile(r"(?i)Δ.*|.*(incr|delta|integral).*|d_?(theta|th|ang\w*|rot\w*|phi|v(el\w*)?)(_?[xyz])?")
 SIGNALS = (
     "a drift record holds a rate [deg/h], an angle [arcsec], a specific force [g], or another quantity with "
     "'# scale = 17.2deg/h/mA'"
@@ -41,7 +45,7 @@ SIGNALS = (
 
 @dataclass(frozen=True)
 class Signal:
-    """A column to reduce: SI value * factor is rad/s (rate), rad (angle, cumulative; increment) or m/s2 (force)."""
+    """A column to reduce: SI value * factor is rad/s, rad (cumulative, or of each sample), m/s2 or m/s (of each)."""
 
     name: str
     unit: str  # as in the file
@@ -51,7 +55,7 @@ class Signal:
     @property
     def reduced(self) -> str:
         """The SI unit of what is analysed."""
-        return KINDS[FORCE if self.kind == FORCE else RATE]
+        return KINDS[FORCE if self.kind in (FORCE, VELOCITY) else RATE]
 
 
 @dataclass(frozen=True)
@@ -212,7 +216,7 @@ def find_signals(table: DriftTable, channel: str, scale: str, increments: bool) 
     """Return the columns to reduce: those that ``channel`` names, or all whose unit (times scale) says so.
 
     scale: "0.5arcsec", "17.2deg/h/mA": one unit (of a column without one: 1) as rate or angle; "" for none.
-    increments: an angle is the one of a sample, not cumulative.  Raises DataError.
+    increments: an angle is the one of a sample, not cumulative, and a velocity is one.  Raises DataError.
     """
     there = named(table.head)
     wanted = [n for n in channel.replace(",", " ").split() if n] if channel else []
@@ -246,10 +250,10 @@ def _signal(name: str, unit: str | None, scale: str, increments: bool) -> Signal
         own = units.unit(unit or "1")
     except units.UnitError as error:
         return f"column '{name}': {error}"
-    angle = INCREMENT if increments else ANGLE
-    for kind, si in KINDS.items():
+    kinds = INCREMENTS if increments else KINDS
+    for kind, si in kinds.items():
         if own.exponents == units.unit(si).exponents:
-            return Signal(name, unit or "", angle if kind == ANGLE else kind, 1.0)
+            return Signal(name, unit or "", kind, 1.0)
     if own.offset:
         return f"column '{name}': [{unit}] is no rate, angle or specific force; {SIGNALS}"
     if not scale:
@@ -257,14 +261,14 @@ def _signal(name: str, unit: str | None, scale: str, increments: bool) -> Signal
         return f"column '{name}': {what}; {SIGNALS}, counts '# scale = 0.5arcsec'"
     if re.fullmatch(r"[-+.\deE\s]+", scale):
         return f"scale = {scale}: no unit; write what one unit of '{name}' is, '0.5arcsec', '0.1mg' or '17.2deg/h/mA'"
-    for kind, si in KINDS.items():
+    for kind, si in kinds.items():
         try:
             factor = units.parse_quantity(scale, _per(si, unit))
         except units.UnitError:
             continue
         if not factor:
             return f"scale = {scale}: must not be 0"
-        return Signal(name, unit or "", angle if kind == ANGLE else kind, factor)
+        return Signal(name, unit or "", kind, factor)
     return f"column '{name}': scale = {scale} times [{unit or '1'}] is no rate, angle or specific force; {SIGNALS}"
 
 

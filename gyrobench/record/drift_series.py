@@ -18,7 +18,7 @@ import math
 import re
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.record.acquisition import Acquisition, Reading
+from gyrobench.record.angles import ROUNDING, CumulativeAngle
 from gyrobench.record.block_means import BlockMeans
 from gyrobench.record.csv_reader import DataError
-from gyrobench.record.drift_columns import DIRECT, FLAG, TIME, DriftTable, Signal, columns_of
-from gyrobench.record.drift_columns import INCREMENT as PER_SAMPLE
+from gyrobench.record.drift_columns import ANGLE, DIRECT, FLAG, TIME, DriftTable, Signal, columns_of
 from gyrobench.record.frozen import EqualSamples
 from gyrobench.record.range_ends import RangeEnds
 
@@ -40,13 +40,9 @@ BEGINNING = 100_000  # values that are kept as they are
 UNEVEN = 0.25  # of the step, rms: not a grid
 BURSTS = 1.5  # mean step of a chunk over its median, where long ones are not whole steps: stamps of arrival
 JITTER = 0.01  # of the step, rms  [DAQ-DRIFT]
-JUMP = 100.0  # spreads of the increments of an angle
 LARGEST = 1e100  # value of a column, and the inverse of the least range: squares are numbers yet
-ROUNDING = 8.0 * float(np.finfo(float).eps)  # of an angle: its differences differ by so much where they are the same
 LONG = 1 << 20  # steps of a gap at most on the grid; of a longer one the rest is left out
 CLOCKS = ("s", "ms", "min", "h")
-TURNS = (2.0 * math.pi,)
-WRAPS = tuple(2.0**k for k in (8, 12, 14, 16, 18, 20, 24, 32))  # of counts
 
 
 Progress = Callable[[Reading], None]
@@ -54,52 +50,15 @@ Progress = Callable[[Reading], None]
 Observer = Callable[[str, int, Array], None]
 
 
-@dataclass
-class _Angle:
-    """Differences of a cumulative angle over blocks."""
-
-    signal: Signal
-    last: float = math.nan
-    usual: float = 0.0
-    spread: float = 0.0
-    resets: int = 0
-    wraps: int = 0
-
-    def increments(self, value: Array, follows: NDArray[np.bool_]) -> Array:
-        """Return the increments up to each sample, NaN where the sample before is missing or a reset lies between."""
-        d = np.diff(np.concatenate([[self.last], value]))
-        d[~follows] = np.nan
-        self.last = float(value[-1])
-        there = d[np.isfinite(d)]
-        if not self.spread and there.size > 8:
-            self.usual = float(np.median(there))
-            off = np.abs(there - self.usual)
-            self.spread = 1.4826 * float(np.median(off))
-            rounding = ROUNDING * float(np.max(np.abs(value)))
-            if self.spread <= rounding:  # most increments are the same number of counts
-                self.spread = float(np.min(off[off > rounding])) if np.any(off > rounding) else 0.0
-        if not self.spread:
-            return d
-        jumped = np.flatnonzero(np.abs(d - self.usual) > JUMP * self.spread)
-        counts = self.signal.unit in ("", "1")
-        periods = tuple(w * abs(self.signal.factor) for w in WRAPS) if counts else TURNS
-        for k in jumped.tolist():
-            right = [d[k] - s * p for p in periods for s in (1.0, -1.0)]
-            best = min(right, key=lambda v: abs(v - self.usual))
-            if abs(best - self.usual) <= JUMP * self.spread:
-                d[k], self.wraps = best, self.wraps + 1
-            else:
-                d[k], self.resets = np.nan, self.resets + 1
-        return d
-
-
 class DriftReader:
     """Reads a table once: rates of the signals on a grid, with what is known of the acquisition."""
 
     def __init__(
-        self, table: DriftTable, signals: Sequence[Signal], regressors: str = "", sampling: float = 0.0
-    ) -> None:
-        self.table, self.signals = table, signals
+        self, table: DriftTable, signals: Sequence[Signal], regressors: str = "", sampling: float = 0.0,
+        cumulative: bool = True,
+    ) -> None:  # fmt: skip
+        """cumulative: angles are stated to be, else those that do not grow are asked for."""
+        self.table, self.signals, self.cumulative = table, signals, cumulative
         self.columns = columns_of(table, signals, regressors)
         self.timed = any(c.name == TIME for c in self.columns)
         if not self.timed and not sampling:
@@ -111,7 +70,7 @@ class DriftReader:
         self.others = [c.name for c in self.columns if c.name not in {TIME, FLAG, *(s.name for s in signals)}]
         self.about = Acquisition(step=0.0 if self.timed else 1.0 / sampling)
         self.held = BlockMeans([TIME, *(s.name for s in signals), *self.others])
-        self.angles = {s.name: _Angle(s) for s in signals if s.kind not in (*DIRECT, PER_SAMPLE)}
+        self.angles = {s.name: CumulativeAngle(s) for s in signals if s.kind == ANGLE}
         self.equal = EqualSamples([s.name for s in signals])
         self.position = 0  # on the grid, of the next sample
         self.cut = 0  # samples of long gaps that are left out of it
@@ -167,6 +126,8 @@ class DriftReader:
         others = {n: block[n][good] for n in self.others}
         values[TIME] = t if self.timed else about.step * number.astype(float)
         self.equal.add(values[TIME] - about.first, {s.name: block[s.name][good] for s in self.signals})
+        for name, angle in self.angles.items():
+            angle.follow(values[TIME], block[name][good])
         about.samples += place.size
         self._put(place, values, others)
 
@@ -253,7 +214,7 @@ class DriftReader:
     def _rate(self, s: Signal, value: Array, follows: NDArray[np.bool_], dt: Array) -> Array:
         self.ends[s.name].add(value)
         value = value * s.factor if s.factor != 1.0 else value
-        if s.kind in (*DIRECT, PER_SAMPLE):
+        if s.kind != ANGLE:
             self._begin(s, value)
             return value if s.kind in DIRECT else value / self.about.step
         d = self.angles[s.name].increments(value, follows)
@@ -338,6 +299,8 @@ class DriftReader:
             about.jitter = math.sqrt(max(self.regular[2] / self.regular[0] - (mean / about.step - 1.0) ** 2, 0.0))
             about.step = mean
         about.last = self.before if self.timed else about.step * (self.position - 1 + self.cut)
+        if not self.cumulative and (asked := [q for a in self.angles.values() if (q := a.question())]):
+            raise DataError(self.table.source, asked)
         for s in self.signals:
             ends = self.ends[s.name]
             low, high = ends.low, ends.high

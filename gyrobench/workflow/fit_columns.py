@@ -23,6 +23,7 @@ from gyrobench.record.column_proposal import (
     match_columns,
     series_columns,
 )
+from gyrobench.record.drift_columns import OF_EACH
 from gyrobench.record.log_files import as_text, heads_of, is_log, tables_of
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
@@ -30,6 +31,7 @@ from gyrobench.workflow.empty_record import empty_record
 from gyrobench.workflow.inputs import load_test
 
 OPTIONAL = ("std", "n", "flagged")
+COUNTS = "counts"  # of columns that are called as the angle or velocity of each sample
 NO_NAMES = "names = false  # no row of names: columns by their numbers"
 KINDS = ("rad/s", "rad", "m/s2", "K")  # of the columns of a drift record, which has any names
 #: what columns without a unit are called -> unit that may be meant
@@ -124,6 +126,8 @@ def _proposal(file: Path, test: System | Suite, table: str, text: Path) -> Colum
             found, wanted, stated = of_samples, samples, {"attitudes": "unknown", **stated}
     if "channel" in test.options and "time" not in found:
         stated = {"sampling": "100Hz", **stated}
+    if "channel" in test.options and any(OF_EACH.fullmatch(name) for name in found):
+        stated = {COUNTS: "increments", **stated}
     others = [c for c in layout.columns if c not in found.values() and c.unit and _is(c, "K")]
     for k, c in enumerate(others):
         found[f"temperature {k + 1}" if k else "temperature"] = c
@@ -166,7 +170,8 @@ def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[st
         name = re.sub(r"\W+", "_", c.name).strip("_") or f"column_{len(found) + 1}"
         likely = next((u for pattern, u in LIKELY.items() if re.fullmatch(pattern, name, re.I)), "")
         timed = c in times
-        kind = next((k for k in KINDS if c.unit and _is(c, k)), likely if not c.unit else "")
+        kinds = (*KINDS, "m/s") if OF_EACH.fullmatch(name) else KINDS
+        kind = next((k for k in kinds if c.unit and _is(c, k)), likely if not c.unit else "")
         if timed and "time" not in found:
             name, kind = "time", "s"
         if kind and name not in found and not (timed and name != "time"):
@@ -217,9 +222,11 @@ def map_text(
         f"# Not used: {', '.join(c.name for c in unused) or 'none'}",
         *(f"# {c.name}: {c.shown} ..." for c in unused if c.shown),
         "#",
-        "# [set]  # what the test needs to know, here or by --set",
+        f"{'' if COUNTS in stated else '# '}[set]  # what the test needs to know, here or by --set",
     ]
-    lines += [f"# {n} = {_quoted(v)}" for n, v in stated.items() if not n.startswith("phase ")]
+    lines += [
+        f"{'' if n == COUNTS else '# '}{n} = {_quoted(v)}" for n, v in stated.items() if not n.startswith("phase ")
+    ]
     return "\n".join(lines) + "\n", problems
 
 

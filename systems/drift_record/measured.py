@@ -33,7 +33,7 @@ TEMPLATE = """\
 # Columns to reduce, one or several, any names: a rate [deg/h], an angle [arcsec], a specific force [g] (all of an IMU
 #   together: names gyro_x ... acc_z make triads), or another quantity and a line
 #   '# scale = 17.2deg/h/mA', of counts '# scale = 0.5arcsec'.  Angles and counts are cumulative (resets are found), or
-#   those of one sample each: '# counts = increments'.  Some columns of many: '# channel = x y'.
+#   those of one sample each (velocities [m/s] too): '# counts = increments'.  Some columns of many: '# channel = x y'.
 # temperature [degC], and columns named by '# regressors = pressure', are taken out by regression, and harmonics over
 #   the angle of the table: '# angle = table_angle', '# harmonics = 2'.
 # flag: other than 0 where a sample is suspect.  What the samples are: '# samples = means' (each since the one before)
@@ -64,7 +64,7 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     except ValueError as error:
         problems.append(str(error))
     try:
-        table, signals, reader = _opened(system, table)
+        table, signals, reader = _opened(system, table, "counts" in said)
         if problems:
             for _ in table.blocks(reader.columns):  # what is wrong with the rows is in the same list
                 pass
@@ -106,15 +106,15 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
 
 
 def _opened(
-    system: System, table: drift_columns.DriftTable
+    system: System, table: drift_columns.DriftTable, stated: bool
 ) -> tuple[drift_columns.DriftTable, list[drift_columns.Signal], DriftReader]:
-    """Return the table with what is to be read of it.  Raises DataError."""
+    """Return the table with what is to be read of it.  stated: what an angle is.  Raises DataError."""
     regressors = system["regressors"]
     if system["angle"]:
         table = drift_columns.with_harmonics(table, system["angle"], system["harmonics"])
         regressors = " ".join([regressors, *drift_columns.harmonic_names(system["harmonics"])])
     signals = drift_columns.find_signals(table, system["channel"], system["scale"], system["counts"] == "increments")
-    return table, signals, DriftReader(table, signals, regressors, system["sampling"])
+    return table, signals, DriftReader(table, signals, regressors, system["sampling"], stated)
 
 
 def _rounding(s: drift_columns.Signal, values: Array, angles: Mapping[str, Sequence[float]]) -> dict[str, Any]:

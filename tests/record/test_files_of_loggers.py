@@ -13,7 +13,9 @@ from gyrobench.record.column_map import read_map, translate
 from gyrobench.record.column_proposal import find_layout
 from gyrobench.record.log_files import as_text, is_log
 from gyrobench.record.text_cells import cells_of_file
+from gyrobench.system.system import load_system
 from gyrobench.workflow.fit_columns import write_columns
+from gyrobench.workflow.measured_run import find_faults, reduce_measured
 
 STAMP = 1603372452123456789  # ns since 1970
 G, A = ("rad/s",) * 3, ("m/s2",) * 3
@@ -146,6 +148,32 @@ def test_a_pointer_of_git_lfs(tmp_path: Path, command: Any) -> None:
     for line in ("reduce", "drift_record", "--data"), ("fit", "--system", "drift_record"):
         code, _, err = command(*line, tmp_path / "a.csv")
         assert code == 2 and "git lfs pull brings it" in err, err
+
+
+def test_angles_and_velocities_of_each_sample(tmp_path: Path, command: Any) -> None:
+    """Taken for cumulative ones they would have no N and a Q that is certain: what they are is asked for.
+
+    White noise of 0.002 rad/s and 0.02 m/s2 at 100 Hz: N = 0.0002 rad/sqrt(s) = 0.6875 deg/sqrt(h), 0.12 m/s/sqrt(h).
+    """
+    rng, n, h = np.random.default_rng(6), 6000, 0.01
+    noise = rng.normal(size=(n, 2)) * [0.002 * h, 0.02 * h] + [5e-5 * h, 0.0]
+    rows = "".join(f"{k * h:.2f},{a:.9e},{v:.9e}\n" for k, (a, v) in enumerate(noise.tolist()))
+    log = tmp_path / "increments.csv"
+    for names in ("dtheta_x [rad],dvel_x [m/s]", "gyro_x [rad],v [m/s]"):
+        log.write_text(f"# type_b = none\ntime [s],{names}\n{rows}", encoding="utf-8")
+        code, _, err = command("reduce", "drift_record", "--data", log)
+        name = names.split()[0]
+        assert code == 2 and f"column '{name}'" in err and "state '# counts = increments'" in err, err
+        outcome = reduce_measured(load_system("drift_record"), log, {"counts": "increments"}, in_memory=True)
+        for channel, true in zip((name, names.split(",")[1].split()[0]), (0.6875, 0.12), strict=True):
+            assert outcome.result[f"N {channel}"].estimate == pytest.approx(true, rel=0.05)
+    text, problems = write_columns(tmp_path / "increments.csv", "drift_record", None)
+    log.write_text(f"time [s],dtheta_x [rad],dvel_x [m/s]\n{rows}", encoding="utf-8")
+    text, problems = write_columns(log, "drift_record", None)
+    assert problems == [] and "\n[set]" in text and '\ncounts = "increments"' in text
+    turning = "".join(f"{k * h:.2f},{1e-4 * k * h + a:.9e}\n" for k, (a, _) in enumerate(noise.tolist()))
+    log.write_text(f"# type_b = none\ntime [s],gyro_x [rad]\n{turning}", encoding="utf-8")  # 20 deg/h
+    assert find_faults(load_system("drift_record"), log, {}) == []
 
 
 def test_a_blank_between_units_multiplies() -> None:
