@@ -11,7 +11,7 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.record import sampling
-from gyrobench.record.drift_columns import ANGLE, DIRECT, FORCE, harmonic_names
+from gyrobench.record.drift_columns import ANGLE, DIRECT, FORCE, VELOCITY, harmonic_names
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.channel_units import ChannelUnits, units_of
@@ -63,13 +63,13 @@ def _column_rows(name: str, units: ChannelUnits, series: Mapping[str, Any]) -> t
     rows += [["longest gap", about["longest"][1], "s"]] if about["longest"][1] else []
     rows += [["rows without a value", about["incomplete"], "1"]] if about["incomplete"] else []
     rows += [["samples flagged", about["flagged"], "1"]] if about["flagged"] else []
-    if kind not in DIRECT:
+    if kind == ANGLE:
         rows.append(["resets of the angle or counter", about["resets"].get(name, 0), "1"])
         rows.append(["turns or overflows unwrapped", about["wraps"].get(name, 0), "1"])
     if series["factor"] > 1:
         rows.append(["samples in a mean that is analysed", series["factor"], "1"])
     if q := column["resolution"]:
-        si, unit = (units.si, units.unit) if kind in DIRECT else (ARCSEC, "″")
+        si, unit = (units.si, units.unit) if kind in DIRECT else (1e-3, "mm/s") if kind == VELOCITY else (ARCSEC, "″")
         rows.append(["resolution of the values", q / si, unit])
     rows.append(["jitter of time stamps, rms, of a step", 0.0 if about["rounded"] else round(about["jitter"], 9), "1"])
     return [["column", f"{name}: {KIND_NAMES.get(kind, kind)} [{column['unit'] or '1'}]", ""]], rows
@@ -88,9 +88,9 @@ def acquisition_texts(p: Prepared, run: RunDocument) -> list[str]:
     ] if unused else []  # fmt: skip
     if run.series["columns"][p.name]["kind"] not in DIRECT:
         out.append(
-            "The rate is the difference of two angles over the step, which is its mean over the step: a sine of "
-            "frequency f has its amplitude times sin(π f T)/(π f T), 0.637 at half the sampling rate. The noise "
-            "coefficients and the model curves allow for it."
+            "A value is what angle or velocity gain within a step, over the step, which is the mean over the step: a "
+            "sine of frequency f has its amplitude times sin(π f T)/(π f T), 0.637 at half the sampling rate. The "
+            "noise coefficients and the model curves allow for it."
         )
     elif not run.series["samples"] and not run.options.get("bandwidth") and _flat(p, run):
         out.append(
@@ -178,9 +178,11 @@ def coarse_text(name: str, run: RunDocument) -> str:
             f"The values are rounded to {number(q / own.si)} {own.unit}, more than twice the noise of a sample: the "
             "error of rounding is not white, and N is that of the rounding."
         )
+    what = f"velocity is rounded to {number(q / 1e-3)} mm/s" if column["kind"] == VELOCITY else ""
     return (
-        f"The angle is rounded to {number(q / ARCSEC)}″, more than 2.5 times its random change within a sample: errors "
-        "of the rounding follow from one another, and the coefficients are off by more than their intervals say."
+        f"The {what or f'angle is rounded to {number(q / ARCSEC)}″'}, more than 2.5 times its random change within a "
+        "sample: errors of the rounding follow from one another, and the coefficients are off by more than their "
+        "intervals say."
     )
 
 
