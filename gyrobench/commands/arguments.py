@@ -28,6 +28,12 @@ def parse_assignments(values: list[str] | None, option: str, example: str) -> di
     return assignments
 
 
+def require_suffix(option: str, file: Path | None, suffix: str, kind: str) -> None:
+    """Raise UsageError for a file to write whose name has another ending: it may hold something else."""
+    if file is not None and file.suffix != suffix:
+        raise UsageError(f"{option} {file}: {kind} ends in {suffix}")
+
+
 def parse_settings(values: list[str] | None) -> dict[str, str]:
     """Return the values of --set by name; those given one by one go before those of files.  Raises UsageError."""
     from_files: dict[str, str] = {}

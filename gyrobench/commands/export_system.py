@@ -7,6 +7,7 @@ from pathlib import Path
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.commands import console
+from gyrobench.commands.arguments import require_suffix
 from gyrobench.packaging import load_part
 from gyrobench.packaging.compiler import PLATFORMS
 from gyrobench.workflow.inputs import check_fmu_files, require_slots
@@ -40,8 +41,7 @@ def export(
         raise UsageError(f"--platform {unknown[0]}: unknown platform; available: {', '.join(PLATFORMS)}")
     kinds = {"ssp": (".ssp", "an SSP archive"), "html": (".html", "a page"), "mat": (".mat", "a MATLAB file")}
     suffix, kind = kinds.get(to, (".fmu", "an FMU"))
-    if out is not None and out.suffix != suffix:
-        raise UsageError(f"--out {out}: {kind} ends in {suffix}")
+    require_suffix("--out", out, suffix, kind)
     home = Bench.find()
     part = name.removeprefix("components/")
     if to == "mat" and part in home.parts() and (part != name or name not in home.systems()):

@@ -72,12 +72,14 @@ def identify(
       gyrobench identify loop.csv --fit J --fit viscous --fit delay --twin twin.toml
     """
     from gyrobench.bench import UsageError, display_path
+    from gyrobench.commands.arguments import require_suffix
     from gyrobench.files import write_whole
     from gyrobench.identification.identify_loop import identify as identify_loop
     from gyrobench.identification.identify_loop import parse_band
 
     if twin is not None and not fit:
         raise UsageError("--twin: what is to be found? Name the parameters, such as --fit J --fit viscous")
+    require_suffix("--twin", twin, ".toml", "a file of values")
     found = identify_loop(
         file, at=at, period=period, band=parse_band(band), columns=columns, fit=fit or [], want=want or [],
         against=against,
@@ -108,9 +110,13 @@ def multisine(
     \b
     Example: gyrobench multisine excitation.csv --band 0.5Hz..100Hz --peak 0.2N.m
     """
-    from gyrobench.bench import display_path
+    from gyrobench.bench import UsageError, display_path
+    from gyrobench.commands.arguments import require_suffix
     from gyrobench.identification.multisine import parse_multisine
 
+    require_suffix("FILE", out, ".csv", "an excitation")
+    if out.exists():  # it may be a record
+        raise UsageError(f"{out}: the file exists; choose another name")
     made = parse_multisine(band, peak, period, rate, seed)
     made.write(out, periods)
     echo(str(made))

@@ -28,6 +28,7 @@ def learn(
       gyrobench learn keyhole
       gyrobench learn drift --language zh --out drift.html
     """
+    from gyrobench.commands.arguments import require_suffix
     from gyrobench.workflow.lessons import lesson, lessons, write_lesson
 
     home = Bench.find()
@@ -38,8 +39,7 @@ def learn(
             texts = each.texts(language)
             echo(f"{each.number:2d}  {each.name:13s} {texts['title']}\n    {texts['question']}")
         return
-    if out is not None and out.suffix != ".html":
-        raise UsageError(f"--out {out}: a page ends in .html")
+    require_suffix("--out", out, ".html", "a page")
     path = out or home.products / f"lesson-{name}.html"
     item = lesson(name, home)
     item.texts(language)  # refused before it is said that something is made

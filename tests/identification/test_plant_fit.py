@@ -158,6 +158,25 @@ def test_a_twin_is_values_of_a_platform(platforms: list[tuple], tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("identify", "loop.csv", "--fit", "J", "--twin", "loop.csv"), "--twin loop.csv: a file of values ends in"),
+        (("identify", "loop.csv", "--fit", "J", "--twin", "."), "--twin .: a file of values ends in .toml"),
+        (("multisine", "loop.csv", "--band", "1Hz..9Hz", "--peak", "1A"), "loop.csv: the file exists; choose another"),
+        (("multisine", "r.xlsx", "--band", "1Hz..9Hz", "--peak", "1A"), "FILE r.xlsx: an excitation ends in .csv"),
+    ],
+)
+def test_no_record_is_written_over(gyrobench: Command, tmp_path: Path, words: tuple[str, ...], message: str) -> None:
+    """The help of identify calls record and twin FILE alike; the one is taken for the other."""
+    record = tmp_path / "loop.csv"
+    record.write_text("time [s],excitation [A],input [A],output [deg/s]\n0,1,2,3\n", encoding="utf-8")
+    before = record.read_bytes()
+    code, out, err = gyrobench(*words)
+    assert code == 2 and message in err and out == "" and "Traceback" not in err
+    assert record.read_bytes() == before and list(tmp_path.iterdir()) == [record]
+
+
+@pytest.mark.parametrize(
     ("texts", "words"),
     [
         (["beauty"], "no such parameter"),
