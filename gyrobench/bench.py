@@ -9,7 +9,7 @@ import hashlib
 import os
 import sys
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,12 +31,20 @@ class UsageError(GyrobenchError):
 MANY = 30  # names that nobody reads in a message
 
 
+def near_names(name: str, known: Sequence[str]) -> list[str]:
+    """Return names like ``name`` (in other letters, a misprint, a part of them), the nearest first."""
+    return (
+        [k for k in known if k.casefold() == name.casefold()]
+        or difflib.get_close_matches(name, known, n=1, cutoff=0.85)
+        or difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+        or [k for k in known if name and name in k]
+    )
+
+
 def suggest_names(name: str, known: Iterable[str]) -> str:
     """Return names like ``name`` (a misprint), else all there are, as the end of a message."""
     known = list(known)
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.85)
-    near = near or difflib.get_close_matches(name, known, n=3, cutoff=0.5) or [k for k in known if name and name in k]
-    if near:
+    if near := near_names(name, known):
         return f"did you mean {' or '.join(near)}?"
     return f"gyrobench list shows all {len(known)}" if len(known) > MANY else f"there are: {', '.join(known) or 'none'}"
 

@@ -88,6 +88,7 @@ def test_unknown_names_are_answered_with_names_that_are_near(tmp_path: Path) -> 
         Bench.find(tmp_path)
     assert suggest_names("xyz", ["site", "table"]) == "there are: site, table"
     assert suggest_names("xyz", []) == "there are: none"
+    assert suggest_names("j", ["mode", "J"]) == "did you mean J?"
 
 
 def test_short_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from gyrobench.bench import near_names, suggest_names
 from gyrobench.errors import GyrobenchError
 from gyrobench.exchange.ssp_export import ExportError
 from gyrobench.system.parameters import defaults, resolve
@@ -43,11 +44,11 @@ class _Chooser:
         found = [n for n in self.causality if n == name or n.startswith(f"{name}[")]
         if not found:
             slot = name.partition(".")[0]
-            slots = ", ".join(self.assembly.paths)
-            what = (
-                f"{slot} has no such variable" if slot in self.assembly.paths else f"no slot '{slot}'; slots: {slots}"
-            )
-            raise ExportError(f"--expose {name}: {what}")
+            if slot not in self.assembly.paths:
+                raise ExportError(f"--expose {name}: no slot '{slot}'; {suggest_names(slot, self.assembly.paths)}")
+            near = near_names(name, [n for n in self.causality if n.startswith(f"{slot}.")])
+            meant = f"; did you mean {' or '.join(near)}?" if near else ""
+            raise ExportError(f"--expose {name}: {slot} has no such variable{meant}")
         return found
 
     def of_part(self, name: str) -> ExposedVariable:

@@ -181,8 +181,8 @@ def test_what_cannot_be_exposed(small: System, tmp_path: Path, foreign: Callable
     for name, why in {
         "gyro.omega": r"--expose gyro.omega\[1\]: this input is wired: table.omega -> gyro.omega",
         "gyro.float_angle": "it is internal; parameters, inputs and outputs can be exposed",
-        "gyro.D_X": "gyro has no such variable",
-        "giro.D_I": "no slot 'giro'; slots: site, sequencer",
+        "gyro.d_i": "gyro has no such variable; did you mean gyro.D_I?",
+        "giro.D_I": "no slot 'giro'; did you mean gyro?",
         "nothing": "neither 'slot.variable' nor an option",
     }.items():
         with pytest.raises(ExportError, match=why):
