@@ -78,6 +78,7 @@ def rows(d: BearingDesign) -> list[tuple[str, str]]:
     found = d.as_dict()
     kgf, arcsec = 9.80665, math.pi / 648000.0
     return [
+        ("gap", f"{d.bearing.gap * 1e6:.3g} µm"),
         ("pressure behind the orifices, centred", f"{found['pressure_ratio']:.3f} of the supply"),
         ("stiffness", f"{found['stiffness'] * 1e-6:.4g} N/µm ({found['stiffness'] / kgf * 1e-6:.4g} kgf/µm)"),
         ("stiffness against tilt", f"{found['tilt_stiffness'] * arcsec:.4g} N·m/″ "

@@ -30,6 +30,12 @@ def test_gap_and_eccentricity_are_those_asked_for(designed: BearingDesign) -> No
     assert designed.eccentricity == pytest.approx(500.0 / 1e9 / b.gap, rel=1e-2)  # it is a spring while eps is small
 
 
+def test_the_gap_is_printed(designed: BearingDesign) -> None:
+    """It is what --stiffness finds: in the file for the part in m, for a reader in um."""
+    gap = parse_quantity(tomllib.loads(designed.toml())["bearing"]["air_gap"], "m")
+    assert f"gap  {gap * 1e6:.3g} µm" in str(designed).splitlines()
+
+
 def test_the_stiffest_gap(designed: BearingDesign) -> None:
     """A neighbour on either side is softer."""
     best = designed.bearing.stiffest()
