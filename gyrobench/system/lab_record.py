@@ -12,6 +12,7 @@ with the column ``time`` instead of t_start and t_end holds time series, see :mo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from textwrap import wrap
@@ -20,9 +21,18 @@ from typing import Any
 import numpy as np
 
 from gyrobench.record.circumstances import Keys, Statement, faults, values_of
-from gyrobench.record.csv_reader import WINDOW_COLUMNS, CsvColumn, DataError, read_head, read_measured, read_statements
+from gyrobench.record.csv_reader import (
+    WINDOW_COLUMNS,
+    CsvColumn,
+    DataError,
+    Head,
+    read_head,
+    read_measured,
+    read_statements,
+)
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import ABOUT, PlanRow, RunDocument
+from gyrobench.record.time_series import read_blocks
 from gyrobench.system.lab_series import faults_of_series, is_time_series, windows_of_series
 from gyrobench.system.system import MeasuredData, System
 from gyrobench.system.values import InvalidValueError
@@ -114,6 +124,7 @@ def read_record(
             windows, _ = read_measured(data, columns, time, keys)
         except DataError as error:
             problems += error.problems
+            windows = {"phase": _phases_there(data, head)}
     said = {**values_of(stated), **values}
     problems += set_options(system, stated, values)
     for name, example in (needed or {}).items():
@@ -127,9 +138,14 @@ def read_record(
         problems.append(f"arrangement = {said['arrangement']}: 'checked' or nothing is expected")
     if series and problems:
         problems += faults_of_series(data, head, columns)
+        windows = {"phase": _phases_there(data, head)}
     elif series:
         named = attitudes(system) if attitudes else None
-        windows, said, notes = windows_of_series(system, data, head, columns, said, named)
+        try:
+            windows, said, notes = windows_of_series(system, data, head, columns, said, named)
+        except DataError as error:
+            problems += error.problems
+            windows = {"phase": _phases_there(data, head)}
     plan: list[PlanRow] = []
     if attitudes is not None:
         plan, unclear = _plan(windows.get("phase", np.empty(0)), said, attitudes(system))
@@ -180,6 +196,15 @@ def measured_run(system: System, plan: Sequence[PlanRow], texts: Mapping[str, st
         system=system.name, spec=list(system.spec), measured=True, complete=True, options=dict(system.values),
         parameters={}, plan=list(plan), **circumstances,
     )  # fmt: skip
+
+
+def _phases_there(file: Path, head: Head) -> np.ndarray[Any, Any]:
+    """Return the phases that the rows of a file name, as far as it can be read: 0 is none."""
+    found = set[float]()
+    with suppress(DataError):
+        for block in read_blocks(file, head, [CsvColumn("phase", "1")]):
+            found |= {p for p in np.unique(block["phase"]).tolist() if p > 0.0 and p.is_integer()}
+    return np.array(sorted(found))
 
 
 def _plan(

@@ -66,6 +66,23 @@ def test_time_series(tmp_path: Path) -> None:
     assert len(said) == len(wanted) and all(w in s for w, s in zip(wanted, said, strict=True)), said
 
 
+@pytest.mark.parametrize("stated", ["", "# latitud = 45deg\n"])
+def test_phases_without_an_attitude_are_named_beside_wrong_rows(tmp_path: Path, stated: str) -> None:
+    """Windows with a row out of order; time series with one, and with a key that is wrong, too."""
+    head = f"{stated}# latitude = 45deg\n# k = 17.2deg/h/mA\n# phase 2 = mount 1\n"
+    windows = "1,0,9,0,0,0.1\n2,30,40,0,9,0.2\n2,20,30,9,18,0.3\n3,50,60,0,0,0.1\n"
+    angles = "angle_start [deg],angle_end [deg]"
+    of_windows = problems("tumble_single_axis", tmp_path / "w.csv",
+                          f"{head}phase,t_start [s],t_end [s],{angles},mean [mA]\n{windows}")  # fmt: skip
+    series = "1,0,0,0.1\n0,1,0,0.1\n2,2,9,0.2\n2,1.5,9,0.3\n3,3,0,0.1\n"
+    of_series = problems("tumble_single_axis", tmp_path / "s.csv",
+                         f"{head}phase,time [s],angle [deg],current [mA]\n{series}")  # fmt: skip
+    for said, order in ((of_windows, "t_start = 20 s does not come after 30 s"), (of_series, "time does not increase")):
+        named = [s[:7] for s in said if "its attitude is not given" in s]
+        assert named == ["phase 1", "phase 3"], said
+        assert sum(order in s for s in said) == 1 and len(said) == 3 + bool(stated), said
+
+
 def test_drift_record(tmp_path: Path) -> None:
     rows = [f"{k},0.5,21" for k in range(40)]
     rows[3], rows[5] = "3,off,21", "5,0.5"
