@@ -10,6 +10,7 @@ from gyrobench.report.numbers import write_number
 from gyrobench.report.ranking_section import place_text, probability_text
 from gyrobench.result import NO_VERDICT, Result, StepCheck, SuiteResult
 
+ARRANGEMENT = "arrangement.unstated"  # reason: mistakes, a reversed reading, that no residual of the record shows
 WIDTH, NARROW = 120, 30  # characters of a line with a meaning, and of a meaning at least
 
 
@@ -48,6 +49,8 @@ def format_result(result: Result) -> str:
         rows.append(row + ([c.verdict] if judged else []))
     notes = [s.replace("No", "no", 1) for s in no_values((c.name, c.no_value) for c in result.coefficients)]
     notes += [f"warning: {w}" for w in [*_doubts(result), *result.warnings]]
+    if not judged:  # a verdict that is taken away says it
+        notes += [f"note: {r.text}" for r in result.reasons if r.id == ARRANGEMENT]
     if result.step_check:
         notes.append(step_sentence(result.step_check))
     if judged:

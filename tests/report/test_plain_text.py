@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from gyrobench.report.plain_text import WIDTH, format_result
 from gyrobench.result import Coefficient, LoopResult, Reason
 
@@ -42,3 +44,17 @@ def test_what_speaks_against_a_record_is_said_without_a_verdict_too() -> None:
     )  # fmt: skip
     warnings = [line for line in format_result(result).splitlines() if line.startswith("warning: ")]
     assert warnings == ["warning: The data lie on the model.", "warning: Inconclusive: The level is another one."]
+
+
+def test_mistakes_that_no_residual_shows_are_named_where_no_verdict_is() -> None:
+    """A tumble with its current reversed fits as well as the truth: all signs of its coefficients are wrong."""
+    unshown = Reason("arrangement.unstated", "No residual shows: the reading reversed.", ("pass",), severity="doubt")
+    withheld = Reason("verdict.withheld:arrangement.unstated", "Inconclusive: no residual would show", severity="error")
+    result = LoopResult(
+        system="s", title="Tumble", method="", sources=[], conventions=[], responses=[], reasons=[unshown],
+        coefficients=[Coefficient("D_F", "drift", "°/h", 0.28, 0.03, 1.96, (0.22, 0.34))],
+    )  # fmt: skip
+    assert "\nnote: No residual shows: the reading reversed." in format_result(result)
+    judged = replace(result, verdict="inconclusive", reasons=[unshown, withheld])
+    text = format_result(judged)
+    assert "note:" not in text and "\nwarning: Inconclusive: no residual would show" in text
