@@ -13,7 +13,7 @@ RESUMING = "the same command with --resume"
 class Advice:
     """The way on from an error.
 
-    action: "resume", "reduce" or "fit", for a face that has a button for it; shell: a clause for all others.
+    action: "resume", "reduce", "fit" or "columns", for a face that has a button for it; shell: a clause for all others.
     """
 
     action: str

@@ -15,8 +15,10 @@ Units tell the first from the others; an excitation with the unit of both must b
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -25,8 +27,10 @@ import numpy as np
 
 from gyrobench import units
 from gyrobench.arrays import Array
+from gyrobench.errors import Advice, GyrobenchError
 from gyrobench.record.circumstances import MISPRINT, Keys
-from gyrobench.record.csv_reader import CsvColumn, DataError
+from gyrobench.record.column_proposal import find_layout
+from gyrobench.record.csv_reader import CsvColumn, DataError, read_head
 from gyrobench.record.drift_columns import open_table
 from gyrobench.record.log_files import as_text, is_log
 
@@ -79,7 +83,38 @@ def read_loop(file: Path, at: str = "", period: str = "", columns: Path | None =
     """
     if columns is not None:
         return _mapped(file, at, period, columns)
-    return _read(as_text(file) if is_log(file) and file.suffix.lower() != ".parquet" else file, file.name, at, period)
+    text = as_text(file) if is_log(file) and file.suffix.lower() != ".parquet" else file
+    try:
+        return _read(text, file.name, at, period)
+    except DataError as error:
+        raise error.advised(*_of_own_layout(file, text)) from None
+
+
+def _of_own_layout(file: Path, text: Path) -> list[Advice]:
+    """Return the first lines of a column map for a file with other names, or with rows above or below them."""
+    with suppress(GyrobenchError, ValueError):
+        found = find_layout(text)
+        names = {str(c.sources[0]).partition("[")[0].strip() for c in found.columns}
+        if (
+            "excitation" not in names
+            or found.below
+            or found.encoding != "utf-8"
+            or read_head(text).line != found.skip + 1
+        ):
+            keys = {"encoding": found.encoding, "delimiter": found.delimiter, "decimal": found.decimal}
+            lines = [] if is_log(file) else [f"{key} = {json.dumps(value)}" for key, value in keys.items()]
+            lines += [
+                f"skip = {found.skip}",
+                f"below = {found.below}",
+                "[columns.time]",
+                'from = "ITS NAME"',
+                'unit = "s"',
+            ]
+            begins = "\n  ".join([*lines, "and so on for excitation, input (or controller) and output"])
+            return [
+                Advice("columns", f"the file has a layout of its own; --columns MAP reads it, a file of:\n  {begins}")
+            ]
+    return []
 
 
 def _mapped(file: Path, at: str, period: str, columns: Path) -> LoopRecord:

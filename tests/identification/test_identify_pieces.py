@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from gyrobench.identification.distortion import distortions, with_distortion
 from gyrobench.identification.identify_loop import identify_record
 from gyrobench.identification.line_spectrum import LineAmplitudes, find_period, misfit
 from gyrobench.identification.loop_curve import _sharp
-from gyrobench.identification.loop_record import LoopRecord
+from gyrobench.identification.loop_record import LoopRecord, read_loop
 from gyrobench.identification.ratios import ratio
+from gyrobench.record.csv_reader import DataError
 
 
 # --------------------------------------------------------------------------------------------- pieces
@@ -96,3 +98,20 @@ def test_periods_are_found() -> None:
     t = np.arange(6003) / 1000.3  # a period of 1000.3 samples
     slow = sum(np.sin(2 * np.pi * k * t + k * k) for k in (1, 3, 5, 7, 11))
     assert misfit(slow, 1000) == pytest.approx(0.3, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("lines", "advised"),
+    [
+        (["gimbal 1;;;", "", "time [s];excitation [A];input [A];output [V]", "0;0.1;0.2;0.3"], ["skip = 2", "';'"]),
+        (["Zeit,Anregung,Eingang,Ausgang", "0,0.1,0.2,0.3"], ["skip = 0", "','"]),
+        (["time [s],excitation [A]", "0,0.1"], []),  # what is missing is in no other layout
+    ],
+)
+def test_a_file_of_another_layout_is_shown_its_map(tmp_path: Path, lines: list[str], advised: list[str]) -> None:
+    file = tmp_path / "loop.csv"
+    file.write_text("\n".join([*lines[:-1], *(lines[-1].replace("0", f"{k}", 1) for k in range(20))]), encoding="utf-8")
+    with pytest.raises(DataError, match=r"column 'input \[unit\]' is missing") as error:
+        read_loop(file)
+    said = " ".join(a.shell for a in error.value.advice).replace('"', "'")
+    assert bool(said) == bool(advised) and all(words in said for words in advised)
