@@ -271,7 +271,7 @@ def test_build_prints_paths_and_is_quick_the_second_time(gyrobench: Command, tmp
     broken = tmp_path / "broken.fmu"
     broken.write_bytes(b"nothing")
     code, out, _ = gyrobench("validate", broken)
-    assert code == 1 and out
+    assert code == 1 and out == f"{broken}: not a readable FMU: File is not a zip file\n"
 
 
 @pytest.mark.long

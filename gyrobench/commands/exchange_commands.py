@@ -125,7 +125,7 @@ def validate(file: Annotated[str, typer.Argument(metavar="FILE|PART", help="An F
 
     problems = check(file, Bench.find().folder)
     for p in problems:
-        echo(p)
+        echo(f"{file}: {p}")
     if problems:
         raise typer.Exit(1)
     echo(f"{file}: no problems found")

@@ -86,7 +86,8 @@ class ColumnProposal:
                 continue
             unused = ", ".join(f"'{c.name}'" for c in self.layout.columns if c not in self.found.values()) or "none"
             source = '"ITS NAME"' if self.layout.names else "ITS NUMBER"
-            unit = f' and unit = "{self.wanted[name]}"' if self.wanted[name] not in ("", "1") else ""
+            wanted = self.wanted[name]
+            unit = f' and unit = "{wanted}"{_counts(wanted)}' if wanted not in ("", "1") else ""
             entry = f"[columns.{name}] with from = {source}{unit}"
             none = f"column '{name}': none of the file fits by name and unit"
             problems.append(f"{none}; write {entry}; not used so far: {unused}")
@@ -249,9 +250,14 @@ def _entry(name: str, c: FileColumn, unit: str, problems: list[str]) -> list[str
     elif unit not in ("", "1"):
         lines.append(f"# unit = {_quoted(unit)}")
         said = f"'{c.written}' is unknown" if c.written else "the file tells none"
-        counts = " (of counts: unit and factor = the size of one)" if c.written else ""
-        problems.append(f"column '{name}': its unit: {said}; write unit = {_quoted(unit)}, or what it is{counts}")
+        problems.append(
+            f"column '{name}': its unit: {said}; write unit = {_quoted(unit)}, or what it is{_counts(unit)}"
+        )
     return lines
+
+
+def _counts(unit: str) -> str:
+    return "" if unit in ("s", "degC", "K") else " (of counts: unit and factor = the size of one)"
 
 
 def _quoted(value: str | int) -> str:

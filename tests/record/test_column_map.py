@@ -227,10 +227,12 @@ def test_proposal_for_columns_without_units(tmp_path: Path) -> None:
     assert [p.split(";")[0] for p in problems] == [
         f"column '{n}': its unit: the file tells none" for n in ("time", "gyro_x", "acc_x", "temperature")
     ]
+    assert ["of counts" in p for p in problems] == [False, True, True, False]
     _, problems = proposed(tmp_path, "a,b\n1,2\n3,4\n", "drift_record")
     none, entry, unused = problems[1].split("; ")
     assert (none, unused) == ("column 'rate': none of the file fits by name and unit", "not used so far: 'a', 'b'")
-    assert entry == 'write [columns.rate] with from = "ITS NAME" and unit = "deg/s"' and len(problems) == 2
+    counts = "(of counts: unit and factor = the size of one)"
+    assert entry == f'write [columns.rate] with from = "ITS NAME" and unit = "deg/s" {counts}' and len(problems) == 2
 
 
 def test_a_temperature_is_not_blamed_for_a_rate_without_unit(tmp_path: Path) -> None:
