@@ -215,7 +215,24 @@ def _excel(file: Path) -> Tables:
     from openpyxl import load_workbook
 
     for sheet in load_workbook(file, read_only=True, data_only=True).worksheets:
-        yield sheet.title, lambda sheet=sheet: {"": [list(r) for r in sheet.iter_rows(values_only=True)]}  # type: ignore[misc]
+        yield sheet.title, lambda sheet=sheet: {"": _sheet_rows(file, sheet)}  # type: ignore[misc]
+
+
+def _sheet_rows(file: Path, sheet: Any) -> list[list[Any]]:
+    """Return the cells of a sheet.  Exits where a program wrote formulas into it and no spreadsheet their values."""
+    from openpyxl import load_workbook
+
+    rows = [list(r) for r in sheet.iter_rows(values_only=True)]
+    if any(None in row for row in rows):
+        written = load_workbook(file, read_only=True)[sheet.title].iter_rows(values_only=True)
+        pairs = (
+            (value, cell)
+            for row, cells in zip(rows, written, strict=False)
+            for value, cell in zip(row, cells, strict=False)
+        )
+        if bare := sum(value is None and str(cell).startswith("=") for value, cell in pairs):
+            sys.exit(f"sheet {sheet.title}: {bare} formulas without a value; open and save the file in a spreadsheet")
+    return rows
 
 
 def flat_width(file: Path) -> int:

@@ -112,7 +112,8 @@ def _fitting(system: System, data: Path) -> list[Advice]:
             for name, c in found.items()
         )
         timed = any(column.time for column in found.values())
-        if not (named and layout.names) or timed or layout.below or (found and read_head(data).line != layout.skip + 1):
+        head = read_head(proposal.text_file).line
+        if not (named and layout.names) or timed or layout.below or (found and head != layout.skip + 1):
             out = f"{data.stem}.toml"
             fit = shlex.join(["gyrobench", "fit", display_path(data), "--system", system.name, "--out", out])
             return [Advice("fit", f"the file has a layout of its own; {fit} proposes a column map for --columns")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from openpyxl import Workbook
 
 from gyrobench.record.column_proposal import find_layout
 from gyrobench.record.csv_reader import DataError
@@ -118,6 +119,13 @@ def test_a_layout_of_its_own_is_pointed_to(tmp_path: Path, monkeypatch: pytest.M
             reduce_measured(load_system("fixed_position"), file, {}, in_memory=True)
         advised[name] = [a.action for a in error.value.advice]
     assert advised == {"units": ["fit"], "merged": ["fit"], "stamps": ["fit"], "word": []}
+    book = Workbook()
+    for line in layouts["merged"]:
+        book.active.append([float(c) if c[0].isdigit() else c for c in line.split(",") if c])
+    book.save(tmp_path / "merged.xlsx")
+    with pytest.raises(DataError) as error:
+        reduce_measured(load_system("fixed_position"), tmp_path / "merged.xlsx", {}, in_memory=True)
+    assert [a.action for a in error.value.advice] == ["fit"]
 
 
 def test_errors_of_a_spreadsheet_are_cells_without_a_value(tmp_path: Path) -> None:

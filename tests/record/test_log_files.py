@@ -221,6 +221,18 @@ def test_a_sheet_is_read_as_it_stands(tmp_path: Path) -> None:
     assert as_text(file, "Klima").read_text(encoding="utf-8").splitlines()[1] == "2026-03-01 08:00:00.000000,20"
 
 
+def test_formulas_that_no_spreadsheet_has_evaluated_are_named(tmp_path: Path) -> None:
+    """A program writes =2*A2 and no value beside it: not an empty cell, which a map may leave out."""
+    from openpyxl import Workbook
+
+    book = Workbook()
+    for row in (["time [s]", "rate [deg/h]", "note"], [0, "=A2*2", None], [1, "=A3*2", None]):
+        book.active.append(row)
+    book.save(tmp_path / "log.xlsx")
+    with pytest.raises(DataError, match="sheet Sheet: 2 formulas without a value; open and save the file"):
+        as_text(tmp_path / "log.xlsx")
+
+
 @pytest.mark.long
 def test_dates_are_seconds_since_the_first_and_gaps_are_empty(tmp_path: Path) -> None:
     file = tmp_path / "log.parquet"
