@@ -46,7 +46,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from gyrobench import reading, units
 from gyrobench.bench import UsageError, suggest_names
 from gyrobench.boundary import faults_of
-from gyrobench.record.clock_times import DATED, HALF_DAY, moment
+from gyrobench.record.clock_times import DATED, HALF_DAY, SET_BACK, length_between, long_readings, moment
 from gyrobench.record.column_numbers import write_numbers
 from gyrobench.record.csv_reader import HEAD_ROWS, DataError, row_list, thousands
 from gyrobench.record.log_files import as_text, is_log
@@ -183,6 +183,7 @@ class MappedRows:
     origin: datetime | None = None
     before: dict[str, str] = field(default_factory=dict)  # last value of each column, as written
     clock: dict[str, float] = field(default_factory=dict)  # last time of each column, s
+    lengths: dict[int, float] = field(default_factory=dict)  # of readings that last to the next row
 
     def lines(self, rows: Iterable[tuple[int, list[str]]]) -> Iterator[str]:
         """Yield a line for each line of the file: remarks, the header, then the rows, "#" for what is left out.
@@ -312,8 +313,13 @@ class MappedRows:
                 cells.append(row[name])
             elif following:
                 cells.append(following[c.next])
-                if _runs_back(row[c.next], following[c.next]):
-                    self._fault(f"column '{c.next}': the next row has {following[c.next]}", row[c.next], number)
+                self.lengths[number] = length = length_between(row[c.next], following[c.next])
+                if length <= 0.0:
+                    timed = self.map.columns[c.next].time
+                    after = self.before[c.next] + SET_BACK if timed else following[c.next]
+                    self._fault(
+                        f"column '{c.next}': the next row has {after}", row[c.next] + " s" * bool(timed), number
+                    )
             elif c.last:
                 cells.append(self._last(c, row[c.next]))
             else:
@@ -340,15 +346,9 @@ class MappedRows:
     def notes(self) -> list[str]:
         """Return what was left out, for the report."""
         said = [f"Left out for an empty cell: {row_list(self.skipped)}."] if self.skipped else []
+        said += long_readings(self.lengths)
         last = "Left out, since no row after it tells its end"
         return said + ([f'{last}: {row_list(self.endless)}; last = "60s" in the map gives it.'] if self.endless else [])
-
-
-def _runs_back(now: str, following: str) -> bool:
-    try:
-        return float(following) <= float(now)
-    except ValueError:  # the reader names it
-        return False
 
 
 def _line(cells: Sequence[str]) -> str:

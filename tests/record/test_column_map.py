@@ -77,6 +77,21 @@ def test_dates_and_clock_times(tmp_path: Path) -> None:
     assert lines[1:] == ["0.0", "2.0"]
 
 
+def test_a_local_clock_that_is_set(tmp_path: Path) -> None:
+    """Readings of a minute each from 01:57 on: at two o'clock the clock shows three, in autumn two once more.  The
+    reading before then would last 61 minutes, and -59."""
+    columns = '[columns.t_start]\nfrom = "a"\ntime = "%H:%M"\n[columns.t_end]\nnext = "t_start"\n'
+    _, done = mapped(tmp_path, "a\n01:57\n01:58\n01:59\n03:00\n03:01\n03:02\n", columns)
+    assert done.problems() == [] and done.lengths[4] == 61 * 60.0
+    assert [n.partition(": ")[2][:20] for n in done.notes() if n.startswith("Readings that last")] == [
+        "row 4. A pause is in"
+    ]
+    autumn = columns.replace("%H:%M", "%d %H:%M")
+    _, done = mapped(tmp_path, "a\n25 02:58\n25 02:59\n25 02:00\n25 02:01\n", autumn)
+    said = "the next row has 25 02:00: a clock that was set back? Times in UTC or with their zone are needed"
+    assert done.problems() == [f"row 3: '60.0 s': column 't_start': {said}"]
+
+
 @pytest.mark.parametrize("encoding", ["cp1252", "utf-16", "utf-16-le", "utf-8-sig", "latin-1"])
 def test_encodings(encoding: str, tmp_path: Path) -> None:
     columns = f'encoding = "{encoding}"\n[columns.x]\nfrom = "Größe"\n'
