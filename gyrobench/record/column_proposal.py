@@ -37,7 +37,11 @@ NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 WITH_UNIT = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\)|(?:/|\bin)\s+(\S+))\s*")
 #: how a row of units writes the form of a date or clock time: TT.MM.JJJJ hh:mm:ss
 FORM_OF_TIME = re.compile(r"(?i)([dtmjyhs]{1,4})([.:/, -]+[dtmjyhsf]{1,4})+")
-SPELLED = {"grad": "deg", "sek": "s", "std": "h", "c": "degC", "°c": "degC", "volt": "V", "ampere": "A", "kelvin": "K"}
+SPELLED = {
+    "grad": "deg", "degree": "deg", "degrees": "deg", "sek": "s", "second": "s", "seconds": "s", "sekunde": "s",
+    "sekunden": "s", "minutes": "min", "minuten": "min", "std": "h", "hours": "h", "stunden": "h", "c": "degC",
+    "°c": "degC", "volt": "V", "volts": "V", "ampere": "A", "milliampere": "mA", "kelvin": "K",
+}  # fmt: skip
 #: end of a name without a unit beside it, as loggers write it: gx_dps, ts_us -> unit
 ENDINGS = {
     "dps": "dps", "mdps": "mdps", "degs": "deg/s", "deg_s": "deg/s", "rads": "rad/s", "rad_s": "rad/s", "degh": "deg/h",
@@ -85,6 +89,7 @@ class FileColumn:
     empty: int
     rises: bool = False  # from row to row
     shown: str = ""  # first values of a column without a name
+    exchangeable: bool = False  # day and month of its dates fit the other way round, too
 
     @property
     def exponents(self) -> object:
@@ -198,6 +203,7 @@ def _rows_above(lines: Sequence[list[str]], start: int, width: int) -> tuple[int
 def _read_unit(text: str) -> str | None:
     """Return the unit of a text, None for one that is unknown."""
     text = text.strip("[]() ")
+    text = text.rstrip(".")  # Sek., deg.
     text = SPELLED.get(text.casefold(), text)
     with suppress(units.UnitError):
         if text in ("", "-"):
@@ -246,14 +252,16 @@ def _columns(
         unit = "" if time else _read_unit(written) or ""
         source: str | int = text if names.count(text) == 1 and text and not numbered else k + 1
         shown = "" if name and not re.fullmatch(r"column_\d+", name) else ", ".join(cells[:3])
-        empty = len(rows) - len(cells)
-        found.append(FileColumn((source,), name or f"column_{k + 1}", unit, written, time, empty, _rises(cells), shown))
+        empty, name = len(rows) - len(cells), name or f"column_{k + 1}"
+        other = time.replace("%d/%m", "%m/%d")  # the one that is tried later
+        either = time != other and all(_fits(c, other) for c in cells[:200])
+        found.append(FileColumn((source,), name, unit, written, time, empty, _rises(cells), shown, either))
     joined: list[FileColumn] = []
     for c in found:
         last = joined[-1] if joined else None
         if last is not None and last.time in DAYS and c.time in CLOCKS:
-            both = FileColumn((*last.sources, *c.sources), last.name, "", "", f"{last.time} {c.time}", c.empty)
-            joined[-1] = both
+            sources, time = (*last.sources, *c.sources), f"{last.time} {c.time}"
+            joined[-1] = FileColumn(sources, last.name, "", "", time, c.empty, exchangeable=last.exchangeable)
         else:
             joined.append(c)
     return tuple(joined)

@@ -243,7 +243,7 @@ def _entry(name: str, c: FileColumn, unit: str, problems: list[str]) -> list[str
     lines = ["", f"[columns.{key}]", f"from = {shown}" if len(sources) == 1 else f"from = [{shown}]"]
     if c.time:
         lines.append(f"time = {_quoted(c.time)}")
-        if c.time.startswith(("%d/%m", "%m/%d")):
+        if c.exchangeable:
             problems.append(f"column '{name}': day and month may be exchanged in {c.time}")
     elif c.unit:
         lines.append(f"unit = {_quoted(c.unit)}")
