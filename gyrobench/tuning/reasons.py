@@ -11,6 +11,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
 from gyrobench.record.frequency_response import Complex
+from gyrobench.reduction.loops.wanted_measure import FACTOR
 from gyrobench.side_by_side import each
 from gyrobench.tuning.controller_search import TuningProblem, descended, frequencies, polished
 from gyrobench.tuning.plant import Plant
@@ -40,8 +41,10 @@ def reasons_of(
     worst = min(r.ratio for r in results)
     binding = [r for r in results if r.ratio <= worst * (1.0 + BINDS)]
     names = " and ".join(r.wish.name for r in binding)
+    reached = ", ".join(r.wish.shown(r.worst) for r in binding)
+    by_factor = "; gains count as factors" if any(r.wish.unit == FACTOR for r in binding) else ""
     found = [f"{names} bind{'s' if len(binding) == 1 else ''}: the best compromise reaches {100.0 * worst:.3g} % of "
-             f"what is wanted of {'it' if len(binding) == 1 else 'each'}"]  # fmt: skip
+             f"what is wanted of {'it' if len(binding) == 1 else 'each'} ({reached}{by_factor})"]  # fmt: skip
     found += each(lambda k: _alone(problem, x, binding[k]), len(binding[:3]), long=True)
     at = dict(binding[0].at)
     k = next(k for k, p in enumerate(problem.plants) if dict(p.values) == at)
@@ -50,7 +53,7 @@ def reasons_of(
     found += _bode(f, loops[k], results)
     if crossed is not None:
         found += _delay(loop, at, problem.plants[k], crossed)
-        found += _modes(problem.plants[k], f, loops[k], crossed)
+        found += _modes(problem.plants[k], f, loops[k], crossed, "notch" in problem.structure.blocks)
     return found
 
 
@@ -126,13 +129,14 @@ def _delay(loop: Loop, at: Any, plant: Plant, crossed: float) -> list[str]:
     ]
 
 
-def _modes(plant: Plant, f: Array, L: Complex, crossed: float) -> list[str]:
-    """Return the bending modes at which the loop comes near to its limit."""
+def _modes(plant: Plant, f: Array, L: Complex, crossed: float, notched: bool) -> list[str]:
+    """Return the bending modes at which the loop comes near to its limit; notched: the structure has a notch."""
     at = [x for x, g in gain_limits(f, L) if g > 1.0] + [float(f[np.argmax(np.abs(1.0 / (1.0 + L) - 0.5))])]
     found = []
     for mode in plant.modes():
         hz = abs(mode) / (2.0 * np.pi)
         if any(1.0 / NEAR < hz / x < NEAR for x in at) and hz > 0.5 * crossed:
             damping = -mode.real / abs(mode)
-            found.append(f"a mode at {hz:.3g} Hz with a damping of {damping:.2g} limits the loop: try a notch there")
+            way = ", with the notch of this structure, too" if notched else ": try a notch there"
+            found.append(f"a mode at {hz:.3g} Hz with a damping of {damping:.2g} limits the loop{way}")
     return found[:2]

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from importlib.util import find_spec
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from gyrobench.bench import UsageError
 from gyrobench.tuning import synthesis
 from gyrobench.tuning.controller_search import TuningProblem, box, frequencies, search
 from gyrobench.tuning.plant import HeldController, Plant
-from gyrobench.tuning.reasons import _alone, _bode
+from gyrobench.tuning.reasons import _alone, _bode, _modes, reasons_of
 from gyrobench.tuning.sight_jitter import MovedSight, SightWays
 from gyrobench.tuning.spread import Range
 from gyrobench.tuning.structures import ControllerStructure
@@ -286,6 +287,26 @@ def test_a_margin_alone_may_have_a_slower_loop() -> None:
     both = problem("gain", ["phase margin=80deg", "bandwidth>30Hz"])
     text = _alone(both, search(both), WishResult(both.wishes[0], 0.1, 0.1, {}))
     assert text == "phase margin alone: no more than 70.1° was found"
+
+
+def test_what_the_best_compromise_reaches_is_said_in_its_unit() -> None:
+    """0.8 of the factor of 6 dB is 6 - 1.94 = 4.06 dB, not 0.8 of the decibels."""
+    one = problem("gain", ["gain margin=6dB", "bandwidth>30Hz"])
+    reached = [WishResult(w, s * w.value, s * w.value, {}) for w, s in zip(one.wishes, (0.8, 1.0), strict=True)]
+    f = np.geomspace(1.0, 100.0, 50)
+    said = reasons_of(SimpleNamespace(step=1e-3), one, search(one), reached, f, np.full((1, 50), 0.1 + 0j))
+    assert said[0] == (
+        "gain margin binds: the best compromise reaches 80 % of what is wanted of it (4.06 dB; gains count as factors)"
+    )
+
+
+def test_a_notch_is_advised_where_there_is_none() -> None:
+    """0.01 times a mode of 500 at 40 Hz is 5 there, and next to nothing elsewhere."""
+    f = np.geomspace(10.0, 100.0, 4001)
+    L = 0.01 * mode(40.0).response(f)
+    (bare,), (notched,) = (_modes(mode(40.0), f, L, 30.0, has) for has in (False, True))
+    assert bare == "a mode at 40 Hz with a damping of 0.001 limits the loop: try a notch there"
+    assert notched.endswith("limits the loop, with the notch of this structure, too")
 
 
 def test_a_spread_that_does_nothing_is_named() -> None:
