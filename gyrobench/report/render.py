@@ -18,6 +18,12 @@ from gyrobench.report.assets import content_dir, read_content
 from gyrobench.report.page_model import Equation, Page, walk
 from gyrobench.report.style import WIDE, clean_svg, themed
 
+#: options (--step), and units with a stroke (°/√h), with the number before them: a browser breaks behind - and /
+WHOLE = re.compile(
+    r"--[a-z][a-z-]*"
+    r"|[−+-]?\d+(?:[.,]\d+)? [^\s&<(]*[^\s&<(\d]/[^\s&<]*[^\s&<.,;:)]"
+    r"|°/[^\s&<]*[^\s&<.,;:)]"
+)
 SCHEME = re.compile(r"[\s\x00-\x20]*([A-Za-z][\w+.\-\s]*):")
 
 
@@ -169,16 +175,16 @@ def _environment(folder: Path) -> Any:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["whole_options"] = _whole_options
+    environment.filters["unbroken"] = _unbroken
     return environment
 
 
-def _whole_options(text: str) -> Any:
-    """Return a text whose options of the command line (--step) are not broken behind their hyphens."""
+def _unbroken(text: str) -> Any:
+    """Return a text that breaks neither its options of the command line (--step) nor a number from its unit (5 °/h)."""
     import markupsafe
 
     escaped = str(markupsafe.escape(text))
-    return markupsafe.Markup(re.sub(r"--[a-z][a-z-]*", r'<span class="option">\g<0></span>', escaped))
+    return markupsafe.Markup(WHOLE.sub(r'<span class="whole">\g<0></span>', escaped))
 
 
 class _Attributes(dict[str, Any]):
