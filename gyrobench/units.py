@@ -195,7 +195,10 @@ def _symbol(tokens: list[str], name: str) -> tuple[float, tuple[Fraction, ...], 
     return f, p, rest
 
 
-USUAL = ("deg/h", "deg/s", "deg/h/mA", "deg/h/sqrt(Hz)", "deg/h/K", "N/m", "N/um", "N.m", "N.m/rad", "kg.m2")
+USUAL = (
+    "deg/h", "deg/s", "deg/h/g", "deg/h/g2", "deg/h/mA", "deg/h/sqrt(Hz)", "deg/sqrt(h)", "deg/h/K", "N/m", "N/um",
+    "N.m", "N.m/rad", "kg.m2",
+)  # fmt: skip
 
 
 @lru_cache(maxsize=1024)

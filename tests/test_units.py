@@ -168,3 +168,4 @@ def test_a_decimal_comma_is_named(text: str, said: str) -> None:
 def test_units_that_fit_are_written_as_the_trade_writes_them() -> None:
     assert fitting("kg.m2") == ("kg.m2", "g.cm2")
     assert fitting("N/m") == ("kg/s2", "N/m", "N/um")
+    assert "deg/h/g" in fitting("°/h/g") and "deg/h/g2" in fitting("°/h/g2") and "deg/sqrt(h)" in fitting("°/√h")
