@@ -139,6 +139,8 @@ REFUSED = [
     (["run", NAME, "--set", "gyro.D_Q=3"], "gyro has no parameter 'D_Q'; nearest: D_"),
     (["show", NAME, "--set", "gyro.D_Q=3"], "gyro has no parameter 'D_Q'; nearest: D_"),
     (["run", NAME, "--set", "latitude=45"], "a number without unit is in rad, write for example latitude=45deg"),
+    (["run", NAME, "--set", "both_senses=yes"], "--set both_senses: 'yes': true or false is expected\n"),
+    (["run", NAME, "--set", "rate=30"], "write 30deg/h, or 30rad/s if that is meant\n"),
     (["run", NAME, "--set", "latitude=45m"], "'m' (m) does not convert to 'rad'"),
     (["run", NAME, "--set", "latitude"], "--set latitude: write NAME=VALUE, for example --set latitude=45.75deg"),
     (["run", NAME, "--set", "turns=1", "--set", "turns=2"], "--set turns: given twice, 1 and 2"),

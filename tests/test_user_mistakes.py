@@ -55,6 +55,11 @@ REFUSED = [
     (["run", "nothing.ssp"], "nothing.ssp refuses to run:\n  - no such file"),
     (["run", "vertical_gyro", "--set", "phases=erection rst"], "'rst' is none of erection"),
     (["run", "stabilizer_sdf", "--set", "J0=0kg.m2"], "J0 = 0 kg.m2: must be > 0"),
+    # options of the reduction alone: found after the run before, whose record then had no way to a report
+    (["run", "tumble_single_axis", "--set", "tilt=maybe"], "--set tilt = maybe: unknown; available: auto, yes, no"),
+    (["run", "servo_polar", "--set", "nuisances=aut"], "--set nuisances = aut: unknown; available: auto, none"),
+    (["run", "servo_polar", "--set", "supply_terms=D=3"], "--set supply_terms: 'D' is not one of D_pickoff"),
+    (["run", "servo_polar", "--set", "corrections=foo"], "'foo' is not of the form 'SOURCE = VALUE(U) UNIT; ...'"),
     (["reduce", "drift_record", "rest.csv"], "rest.csv: not usable:\n  - no such file"),
     (["reduce", "platform_single_axis", "--template"], "no reduction of measured data; there is one for acc"),
 ]

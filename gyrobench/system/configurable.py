@@ -8,7 +8,7 @@ import importlib.util
 import math
 import sys
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -19,6 +19,9 @@ from gyrobench.reading import shorten
 from gyrobench.system.bare_numbers import question, usual_size
 from gyrobench.system.values import InvalidValueError, flatten, parse
 from gyrobench.user_code import blamed, check_attributes
+
+#: unit of options -> the one that people write
+HINTS = {"rad": "deg", "rad/s": "deg/h"}
 
 
 class InvalidConfigurationError(GyrobenchError):
@@ -35,11 +38,19 @@ def _bound(value: float, unit: str) -> str:
     return f"{shown} ({math.degrees(value):.6g}deg)" if unit == "rad" and value else shown
 
 
+def _unit_hint(name: str, given: str, unit: str) -> str:
+    """Return the end of a message about a number that was given without its unit."""
+    if unit not in HINTS or given[-1:].isalpha():
+        return ""
+    return f"; a number without unit is in {unit}, write for example {name}={given}{HINTS[unit]}"
+
+
 @dataclass(frozen=True)
 class Option:
     """A value that the user may set; ``default`` may carry a unit.  ``unit`` int, bool or str: of that type.
 
-    sets: parameters of parts that the option owns, which take its value: "site.latitude stand.latitude".
+    sets: parameters of parts that the option owns, which take its value: "site.latitude stand.latitude".  form: text ->
+    why the reduction of a run would refuse it, "" where it would not.
     """
 
     default: Any
@@ -48,6 +59,7 @@ class Option:
     min: float | None = None
     max: float | None = None
     sets: str = ""
+    form: Callable[[str], str] | None = None
 
     @property
     def kind(self) -> type:
@@ -61,10 +73,13 @@ class Option:
             raise InvalidValueError(f"{name} = {shorten(str(value))}: a list, where one value is expected")
         if not isinstance(number, str | list):
             given = value.strip() if isinstance(value, str) else f"{number:g}"
+            hint = _unit_hint(name, given, unit)
             if self.min is not None and not number >= self.min:
-                raise InvalidValueError(f"{name} = {given}: must be >= {_bound(self.min, unit)}")
+                raise InvalidValueError(f"{name} = {given}: must be >= {_bound(self.min, unit)}{hint}")
             if self.max is not None and not number <= self.max:
-                raise InvalidValueError(f"{name} = {given}: must be <= {_bound(self.max, unit)}")
+                raise InvalidValueError(f"{name} = {given}: must be <= {_bound(self.max, unit)}{hint}")
+        if self.form is not None and (wrong := self.form(str(number))):
+            raise InvalidValueError(wrong)
         if self.kind is float and value is not self.default:
             own = flatten("", parse(name, self.default, unit, self.kind)).values()
             question(name, value, number, unit, usual_size(own, (self.min, self.max)))

@@ -96,7 +96,8 @@ def parse(name: str, value: Any, unit: str = "1", kind: type = float) -> Any:
             try:
                 value = units.parse_quantity(text, unit or "1", per_g0=True)
             except units.UnitError as error:
-                raise InvalidValueError(f"{name}: {error}") from None
+                why = f"'{reading.shorten(text)}': true or false is expected" if kind is bool else error
+                raise InvalidValueError(f"{name}: {why}") from None
     if isinstance(value, list | tuple):
         return [parse(f"{name}[{k}]", v, unit, kind) for k, v in enumerate(value, 1)]
     if kind is str:

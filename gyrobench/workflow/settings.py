@@ -11,8 +11,6 @@ from gyrobench.system.system import System
 from gyrobench.system.values import InvalidValueError
 from gyrobench.workflow.inputs import load_test
 
-HINTS: Mapping[Any, str] = {"rad": "deg", "rad/s": "deg/h"}
-
 
 def load_with_values(
     name: str, values: Mapping[str, str], step: float | None = None, coupling: str = "sequential"
@@ -41,12 +39,4 @@ def apply_values(test: System | Suite, values: Mapping[str, Any]) -> None:
         try:
             test.set(key, value)
         except InvalidValueError as error:
-            raise UsageError(f"--set {error}{_unit_hint(test, key, value)}") from None
-
-
-def _unit_hint(test: System | Suite, key: str, value: Any) -> str:
-    """Return the end of a message about a number that was given without its unit."""
-    option = test.options.get(key)
-    if option is None or option.unit not in HINTS or str(value)[-1:].isalpha():
-        return ""
-    return f"; a number without unit is in {option.unit}, write for example {key}={value}{HINTS[option.unit]}"
+            raise UsageError(f"--set {error}") from None

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from gyrobench import drift
 from gyrobench.system.families.handed_axis import pole_axis
-from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SITE, type_b
+from gyrobench.system.families.option_groups import CORRECTIONS, NUISANCES, SITE, TILTED, type_b
 from gyrobench.system.families.physical_form import PHYSICAL_FORM
 from gyrobench.system.families.rebalance_test import TwoChannelTest
 from gyrobench.system.families.tumble_test import TumbleTest
@@ -42,7 +42,7 @@ class TumbleTwoChannel(TumbleTest, TwoChannelTest):
         | {
             "fold": Option(False, bool, "accept that Dx_yy and Dy_xx are folded into the other squares, the constant"),
             "tilt": Option("auto", str, "tilts of the measuring axes to the spin axis: estimated (yes; needs "
-                           "both_senses), zero (no), or weighed by the data (auto)"),
+                           "both_senses), zero (no), or weighed by the data (auto)", form=TILTED),
         }
         | NUISANCES
         | CORRECTIONS

@@ -91,6 +91,8 @@ def test_a_wrong_value_is_said_where_it_is_written(page: Any, studio: tuple[str,
     page.goto(base_of(studio) + "/system/fixed_position")
     page.get_by_label("latitude", exact=True).fill("3 kg")
     page.locator(".q-field__messages").get_by_text(re.compile("latitude.*kg")).wait_for()
+    page.get_by_label("latitude", exact=True).fill("45.75")
+    page.locator(".q-field__messages").get_by_text("write for example latitude=45.75deg").wait_for()
     page.get_by_role("button", name="Run").click()
     page.locator(".q-notification").wait_for()
     assert "/system/" in page.url

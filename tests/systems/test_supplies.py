@@ -14,7 +14,8 @@ from gyrobench.engine.session import Session
 from gyrobench.reduction.drift.supplies import read_terms
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Result
-from gyrobench.system.system import InvalidConfigurationError, System, load_system
+from gyrobench.system.system import System, load_system
+from gyrobench.system.values import InvalidValueError
 
 DPH = math.pi / 648000.0
 W = frames.EARTH_RATE / DPH
@@ -149,7 +150,7 @@ def test_terms_and_refusals(sessions: dict[str, Session]) -> None:
     for text, said in (("D_X=1", "not one of"), ("k_E=1, k_E=2", "stands twice"), ("D_UI=2mm", "does not convert")):
         with pytest.raises(ReductionError, match=said):
             read_terms(text)
-        with pytest.raises(InvalidConfigurationError, match=said):
+        with pytest.raises(InvalidValueError, match=said):
             sessions["fixed_position"].run({**FIXED, "supply_terms": text})
 
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -121,10 +120,10 @@ def read_terms(text: str) -> dict[str, float]:
     return found
 
 
-def supply_problems(values: Mapping[str, Any]) -> list[str]:
-    """Return what is wrong with the option ``supply_terms`` before a run."""
+def misstated(text: str) -> str:
+    """Return what is wrong with an option ``supply_terms``, "" for nothing."""
     try:
-        read_terms(str(values.get("supply_terms", "")))
+        read_terms(text)
     except ReductionError as error:
-        return [str(error)]
-    return []
+        return error.problems[0]
+    return ""

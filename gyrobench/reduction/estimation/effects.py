@@ -77,6 +77,12 @@ def with_set_up(
     return replace(again, corrections=tuple(taken), known_tests=again.made_tests)
 
 
+def misstated(text: str) -> str:
+    """Return what is wrong with the form of an option corrections, "" for nothing.  Its sources the fit knows."""
+    wrong = [one for one in text.split(";") if one.strip() and not _ONE.fullmatch(" ".join(one.split()))]
+    return f"corrections: '{shorten(wrong[0].strip())}' is not of the form {FORM}" if wrong else ""
+
+
 def _corrections(effects: Sequence[Effect], text: str, elsewhere: Sequence[str]) -> list[Correction]:
     if not text.strip():
         return []

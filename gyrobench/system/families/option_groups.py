@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from types import ModuleType
 
+from gyrobench.reading import shorten
 from gyrobench.reduction.setup.sources import SHARED, Source, stating
 from gyrobench.system.configurable import Option
 from gyrobench.units import DEG
@@ -31,15 +34,48 @@ MOVING = {
     "earth_rate": Option(7.2921159e-5, "rad/s", "Earth rate; 0: none", 0.0, sets="motion.earth_rate"),
 }
 TORQUER = {"k": Option(0.0, "rad/s/A", "torquer scale factor for the reduction; 0: the parameter k of the gyro", 0.0)}
+
+
+def one_of(name: str, *known: str) -> Callable[[str], str]:
+    """Return the form of an option that is one of some words."""
+    return partial(_one_of, name, known)
+
+
+def _one_of(name: str, known: Sequence[str], text: str) -> str:
+    return "" if text.lower() in known else f"{name} = {shorten(text)}: unknown; available: {', '.join(known)}"
+
+
+def _of_corrections(text: str) -> str:
+    from gyrobench.reduction.estimation.effects import misstated  # list and help need none of it
+
+    return misstated(text)
+
+
+def _of_supplies(text: str) -> str:
+    from gyrobench.reduction.drift.supplies import misstated
+
+    return misstated(text)
+
+
 NUISANCES = {
-    "nuisances": Option("auto", str, "set-up effects (trend, temperature ...): weighed by the data (auto), or none"),
+    "nuisances": Option(
+        "auto",
+        str,
+        "set-up effects (trend, temperature ...): weighed by the data (auto), or none",
+        form=one_of("nuisances", "auto", "none"),
+    ),
     "robust": Option(False, bool, "show a robust fit beside the plain one"),
 }
+TILTED = one_of("tilt", "auto", "yes", "no", "true", "false")
 TILT = {
-    "tilt": Option("auto", str, "input-axis misalignment: estimated (yes), zero (no), or weighed by the data (auto)")
+    "tilt": Option(
+        "auto", str, "input-axis misalignment: estimated (yes), zero (no), or weighed by the data (auto)", form=TILTED
+    )
 }
 CORRECTIONS = {
-    "corrections": Option("", str, "measured set-up errors, names as in the budget: SOURCE = VALUE(U) UNIT; ...")
+    "corrections": Option(
+        "", str, "measured set-up errors, names as in the budget: SOURCE = VALUE(U) UNIT; ...", form=_of_corrections
+    )
 }
 FOLD = {"fold": Option(False, bool, "accept that D_OO is folded into D_F, D_II and D_SS")}
 SETTLE = {"settle": Option(10.0, "s", "wait before averaging, after each move", 0.0)}
@@ -63,6 +99,9 @@ def type_b(*sources: str | Source | ModuleType, **meanings: str) -> dict[str, Op
 #: electrical supplies of the gyro  [GYRO-SUPPLY]
 SUPPLY = {
     "supply_terms": Option(
-        "", str, "what supplies do to the gyro (D_pickoff=0.1deg/h, D_US=1deg/h/g ...); empty: as set"
+        "",
+        str,
+        "what supplies do to the gyro (D_pickoff=0.1deg/h, D_US=1deg/h/g ...); empty: as set",
+        form=_of_supplies,
     )
 } | type_b("wheel_frequency", "wheel_voltage", "wheel_phase", "pickoff_excitation", "torquer_excitation")

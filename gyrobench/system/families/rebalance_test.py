@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from gyrobench.reduction.drift.supplies import supply_problems
 from gyrobench.system.families.table_test import SDF_NOISES, TABLE, TableTest, on_table, sampled, supply, surroundings
 from gyrobench.system.part_values import PartValues
 from gyrobench.system.system import OnRequest, Slot
@@ -69,7 +68,7 @@ class RebalanceTest(TableTest):
         ]
 
     def check(self) -> list[str]:
-        problems = super().check() + supply_problems(self.values)
+        problems = super().check()
         if self.step > STEP_MAX:
             problems.append(
                 f"step = {self.step:g} s: the rebalance loop exchanges once a step and needs at most {STEP_MAX:g} s"
