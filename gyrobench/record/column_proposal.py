@@ -38,9 +38,9 @@ WITH_UNIT = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\)|(?:/|\bin)\s+(\S+))
 #: how a row of units writes the form of a date or clock time: TT.MM.JJJJ hh:mm:ss
 FORM_OF_TIME = re.compile(r"(?i)([dtmjyhs]{1,4})([.:/, -]+[dtmjyhsf]{1,4})+")
 SPELLED = {
-    "grad": "deg", "degree": "deg", "degrees": "deg", "sek": "s", "second": "s", "seconds": "s", "sekunde": "s",
-    "sekunden": "s", "minutes": "min", "minuten": "min", "std": "h", "hours": "h", "stunden": "h", "c": "degC",
-    "°c": "degC", "volt": "V", "volts": "V", "ampere": "A", "milliampere": "mA", "kelvin": "K",
+    "grad": "deg", "degree": "deg", "degrees": "deg", "sec": "s", "sek": "s", "second": "s", "seconds": "s",
+    "sekunde": "s", "sekunden": "s", "minutes": "min", "minuten": "min", "std": "h", "hours": "h", "stunden": "h",
+    "c": "degC", "°c": "degC", "volt": "V", "volts": "V", "ampere": "A", "milliampere": "mA", "kelvin": "K",
 }  # fmt: skip
 #: end of a name without a unit beside it, as loggers write it: gx_dps, ts_us -> unit
 ENDINGS = {

@@ -254,9 +254,11 @@ def test_day_and_month_are_asked_for_where_both_orders_fit(tmp_path: Path) -> No
     """The 28th of a month tells them, the 5th does not; names spell their units out."""
     for day, form, asked in (("03/28", "%m/%d", False), ("28/03", "%d/%m", False), ("05/03", "%d/%m", True)):
         rows = "".join(f"{day}/2026,12:{k:02d}:00,0.{k + 10}\n" for k in range(30))
-        text, problems = proposed(tmp_path, f"Datum,Uhrzeit (Sek.),Strom (Milliampere)\n{rows}", "fixed_position")
+        text, problems = proposed(tmp_path, f"Datum,Uhrzeit (Sec.),Strom (Milliampere)\n{rows}", "fixed_position")
         assert f'time = "{form}/%Y %H:%M:%S"' in text and 'unit = "mA"' in text
         assert bool(problems) == any("may be exchanged" in p for p in problems) == asked, problems
+    text, problems = proposed(tmp_path, "Beginn (Sec.),Ende (seconds),Strom [A]\n0,1,2\n1,2,3\n", "fixed_position")
+    assert text.count('unit = "s"') == 2 and problems == []
 
 
 def test_a_temperature_is_not_blamed_for_a_rate_without_unit(tmp_path: Path) -> None:
