@@ -152,6 +152,7 @@ def page_content(item: Lesson, language: str = ENGLISH) -> dict[str, Any]:
     texts, curve, answer = item.texts(language), item.data["curve"], item.data["answer"]
     outputs = set(item.simulated.names) - {"t"}
     unit = answer["unit"]
+    factor = units.factor(curve["unit"]) if curve["unit"] != "1" else 1.0
     return {
         "name": item.name, "number": item.number, "language": catalogue(language).html if language != ENGLISH else "en",
         "words": words_in(language), "begin": item.begin, "end": item.end, "rows": ROWS,
@@ -165,7 +166,8 @@ def page_content(item: Lesson, language: str = ENGLISH) -> dict[str, Any]:
             for letter, (low, high, shown) in item.data["sliders"].items()
         },
         "unit": curve["unit"], "shown": units.display(curve["unit"]),
-        "factor": units.factor(curve["unit"]) if curve["unit"] != "1" else 1.0,
+        "factor": factor,
+        "least": factor * units.parse_quantity(curve["tolerance"], curve["unit"]),  # margin of the axis
         "simulated": item.simulated.script(_place), "theory": [f.script(_place) for f in item.theory],
         "equation": equation_svg(curve["equation"], f"lesson-{item.name}"),
         "answer": {

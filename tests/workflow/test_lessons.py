@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import importlib.util
 import math
+import re
 import time
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,18 @@ from gyrobench.bench import UsageError
 from gyrobench.errors import GyrobenchError
 from gyrobench.report.language import WORD
 from gyrobench.workflow.formula import Formula, FormulaError
-from gyrobench.workflow.lessons import TEXTS, WORDS, Lesson, lesson, lessons, starts, units_of, words_in, write_lesson
+from gyrobench.workflow.lessons import (
+    TEXTS,
+    WORDS,
+    Lesson,
+    lesson,
+    lessons,
+    page_content,
+    starts,
+    units_of,
+    words_in,
+    write_lesson,
+)
 
 EVERY = {item.name: item for item in lessons()}
 CURVES = [name for name in EVERY if name != "random_walk"]  # whose theory is a line, not a spread
@@ -123,6 +135,17 @@ BY_HAND = {
     "meridian": 152.97,  # 2 pi / sqrt(5.586e-5 (5.586e-5 + 0.1/12)) s in min
     "keyhole": 80.4059,
 }
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_no_quotient_is_taken_into_a_function(name: str) -> None:
+    """Typst sets "Omega cos phi / k" as Omega cos of phi/k; the lesson of the erection said that."""
+    assert not re.search(r"\b(sin|cos|tan)(\^\d)? \w+ /", EVERY[name].data["curve"]["equation"])
+
+
+def test_the_axis_shows_no_less_than_the_tolerance() -> None:
+    """0.001 deg/h in rad/s: what remains of the settling, 0.0001 deg/h, filled the picture of a constant rate."""
+    assert page_content(EVERY["earth"])["least"] == pytest.approx(1e-3 * math.pi / 180.0 / 3600.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -233,6 +256,13 @@ def test_the_page_of_a_lesson(tmp_path: Path) -> None:
         assert np.abs(other.reshape(-1, 3)[:, 1]).max() < math.radians(61.0)  # no faster than its largest rate
         assert np.abs(other.reshape(-1, 3)[:, 2]).max() > math.radians(110.0)  # 10 / cos 85 = 114.7
 
+        marks = "[10.47390, 10.47395, 10.474].map(x => plain(x, 5e-5))"
+        assert browser.run(marks) == ["10.4739", "10.47395", "10.474"], "each mark is told from the next"
+        assert browser.run("[0.1 + 0.2, -2e-9, 600].map((x, k) => plain(x, [0.1, 1e-9, 200][k]))") == [
+            "0.3",
+            "−2e−9",
+            "600",
+        ]
         answers = {
             "80.4°": "Right.", "80,4 deg": "Right.", "1.403 rad": "Right.", "4824 arcmin": "Right.", "80.4": "A number",
             "80.4 kg": "The answer has another unit", "−80.4°": "The size is right", "45 deg": "Not yet.",

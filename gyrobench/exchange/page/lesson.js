@@ -71,7 +71,7 @@ function lessonChart(canvas) {
   const v = letters();
   lesson.shownRows = lessonRows(count ? table() : new Float64Array(0), count, v, 1);
   const sets = [lesson.shownRows, ...(before ? [lessonRows(before.data, before.count, before.letters, 0.35)] : [])];
-  return plot(canvas, sets, formulas.map((_, k) => k), () => [1 / lesson.factor, lesson.shown]);
+  return plot(canvas, sets, formulas.map((_, k) => k), () => [1 / lesson.factor, lesson.shown], lesson.least);
 }
 
 function exercise() {

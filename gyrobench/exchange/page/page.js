@@ -149,7 +149,8 @@ function ticks(low, high, most) {
   return found;
 }
 
-const plain = (x) => (x === 0 ? "0" : String(Number(x.toPrecision(6))).replace("-", "−"));
+/** A mark as text, to the digits that tell it from the next one. */
+const plain = (x, step) => (x === 0 ? "0" : String(Number(x.toFixed(Math.min(100, Math.max(0, 1 - Math.floor(Math.log10(step))))))).replaceAll("-", "−"));
 
 /** A band from the smallest to the largest value of each pixel, and a line through their means. */
 function line(pen, { data, count: rowCount, width }, column, x, y) {
@@ -170,8 +171,8 @@ function line(pen, { data, count: rowCount, width }, column, x, y) {
   pen.stroke();
 }
 
-/** Draw columns of sets of rows ({data, count, width, alpha}, the time first); return the unit at the axis. */
-function plot(canvas, sets, indices, scaled) {
+/** Draw columns of sets of rows ({data, count, width, alpha}, the time first); return the unit at the axis.  least: margin. */
+function plot(canvas, sets, indices, scaled, least = 0) {
   const ratio = devicePixelRatio || 1, w = canvas.clientWidth, h = canvas.clientHeight;
   if (!w) return undefined; // folded away
   canvas.width = w * ratio;
@@ -189,7 +190,7 @@ function plot(canvas, sets, indices, scaled) {
   }
   if (!(high >= low)) return undefined;
   const [factor, unit] = scaled(Math.max(Math.abs(low), Math.abs(high)));
-  const margin = high > low ? 0.06 * (high - low) : Math.abs(high) || 1;
+  const margin = Math.max(least, 0.06 * (high - low)) || Math.abs(high) || 1;
   [low, high] = [factor * (low - margin), factor * (high + margin)];
   const hours = last > 7200, per = hours ? 3600 : 1, left = 74, bottom = h - 34, top = 8, right = w - 10;
   const x = (t) => left + ((right - left) * t) / (last || 1), y = (v) => bottom - ((bottom - top) * (factor * v - low)) / (high - low);
@@ -198,15 +199,16 @@ function plot(canvas, sets, indices, scaled) {
   pen.strokeStyle = style.getPropertyValue("--line");
   pen.textAlign = "right";
   pen.textBaseline = "middle";
-  for (const v of ticks(low, high, 5)) {
+  const levels = ticks(low, high, 5);
+  for (const v of levels) {
     const py = bottom - ((bottom - top) * (v - low)) / (high - low);
     pen.beginPath(); pen.moveTo(left, py); pen.lineTo(right, py); pen.stroke();
-    pen.fillText(plain(v), left - 6, py);
+    pen.fillText(plain(v, levels[1] - levels[0] || 1), left - 6, py);
   }
   pen.textAlign = "center";
   pen.textBaseline = "top";
   const marks = last ? ticks(0, last / per, Math.max(2, w / 110)) : [0];
-  for (const t of marks) pen.fillText(plain(t), x(t * per), bottom + 5);
+  for (const t of marks) pen.fillText(plain(t, marks[1] - marks[0] || 1), x(t * per), bottom + 5);
   pen.fillText(`${say("time")} / ${hours ? "h" : "s"}`, (left + right) / 2, bottom + 19);
   pen.lineWidth = 1.3;
   pen.lineJoin = "round";
