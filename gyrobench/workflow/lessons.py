@@ -173,7 +173,7 @@ def page_content(item: Lesson, language: str = ENGLISH) -> dict[str, Any]:
         "answer": {
             "script": Formula(answer["value"]).script(_place), "set": item.answer_values(), "unit": unit,
             "tolerance": answer["tolerance"],
-            "units": {name: units.factor(name) for name in units.fitting(unit)},
+            "units": {name: units.factor(name) for name in (unit, *units.fitting(unit))},
         },
     }  # fmt: skip
 

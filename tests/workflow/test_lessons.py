@@ -143,6 +143,13 @@ def test_no_quotient_is_taken_into_a_function(name: str) -> None:
     assert not re.search(r"\b(sin|cos|tan)(\^\d)? \w+ /", EVERY[name].data["curve"]["equation"])
 
 
+@pytest.mark.parametrize("name", EVERY)
+def test_an_answer_may_have_the_unit_that_the_page_gives_as_an_example(name: str) -> None:
+    """ "12.3 arcsec/s" is the example of the lesson of damping, and 0.309 arcsec/s was "another unit"."""
+    answer = page_content(EVERY[name])["answer"]
+    assert answer["units"][answer["unit"]] == units.factor(answer["unit"])
+
+
 def test_the_axis_shows_no_less_than_the_tolerance() -> None:
     """0.001 deg/h in rad/s: what remains of the settling, 0.0001 deg/h, filled the picture of a constant rate."""
     assert page_content(EVERY["earth"])["least"] == pytest.approx(1e-3 * math.pi / 180.0 / 3600.0, rel=1e-12)
@@ -265,6 +272,7 @@ def test_the_page_of_a_lesson(tmp_path: Path) -> None:
         ]
         answers = {
             "80.4°": "Right.", "80,4 deg": "Right.", "1.403 rad": "Right.", "4824 arcmin": "Right.", "80.4": "A number",
+            "80.4 degrees": "Right.", "4824'": "Right.",
             "80.4 kg": "The answer has another unit", "−80.4°": "The size is right", "45 deg": "Not yet.",
             "": "A number", "x deg": "A number",
         }  # fmt: skip

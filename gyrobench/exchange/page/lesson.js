@@ -92,14 +92,16 @@ function exercise() {
   return box;
 }
 
-const UNITS = { "°": "deg", "º": "deg", "′": "arcmin", "″": "arcsec", "·": ".", "²": "2", "µ": "u" };
+const UNITS = { "°": "deg", "º": "deg", "′": "arcmin", "″": "arcsec", "'": "arcmin", '"': "arcsec", "·": ".", "²": "2", "µ": "u" };
+const SPELLED = { degree: "deg", degrees: "deg", sec: "s", second: "s", seconds: "s", minute: "min", minutes: "min", hr: "h", hour: "h", hours: "h" };
 
 /** Whether an answer as written is right, and what is said of it. */
 function judge(text) {
   const { answer } = lesson, example = `12.3 ${answer.unit}`;
   const found = text.trim().replace("−", "-").replace(/^([-+]?\d+),(\d+)/, "$1.$2").match(/^([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(.*)$/i);
   if (!found || !found[2]) return [false, say("A number with its unit is expected, such as {v}.", example)];
-  const unit = found[2].replace(/[°º′″·²µ]/g, (c) => UNITS[c]).replace(/\s/g, "");
+  const signs = found[2].replace(/[°º′″'"·²µ]/g, (c) => UNITS[c]).replace(/\s/g, "");
+  const unit = signs.replace(/[a-z]+/gi, (word) => SPELLED[word.toLowerCase()] ?? word);
   const factor = answer.units[unit] ?? answer.units[unit.replace(/^deg\/s$/, "dps")];
   if (factor === undefined) return [false, say("The answer has another unit, such as {v}.", example)];
   const right = new Function("v", `return ${answer.script};`)(letters(answer.set)), given = Number(found[1]) * factor;
