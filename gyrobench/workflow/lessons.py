@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench import reading, units
-from gyrobench.bench import Bench, UsageError, standard_folder
+from gyrobench.bench import Bench, UsageError, standard_folder, suggest_names
 from gyrobench.report.language import ENGLISH, catalogue, check_code, codes
 from gyrobench.report.render import equation_svg
 from gyrobench.workflow.formula import Formula
@@ -116,7 +116,7 @@ def lesson(name: str, bench: Bench | None = None) -> Lesson:
     """Return a lesson.  Raises UsageError."""
     every = {item.name: item for item in lessons(bench)}
     if name not in every:
-        raise UsageError(f"no lesson '{reading.shorten(reading.visible(name))}'; there are: {', '.join(every)}")
+        raise UsageError(f"no lesson '{reading.shorten(reading.visible(name))}'; {suggest_names(name, every)}")
     return every[name]
 
 

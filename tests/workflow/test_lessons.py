@@ -211,6 +211,8 @@ def test_a_formula_by_hand() -> None:
 
 
 def test_a_lesson_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"no lesson 'keyholle'; did you mean keyhole\?"):
+        lesson("keyholle")
     with pytest.raises(UsageError, match=r"no lesson 'x'.*drift.*keyhole"):
         lesson("x")
     with pytest.raises(UsageError, match="no text in 'fr'"):
