@@ -162,6 +162,24 @@ def test_noise_that_settings_share_by_their_seeds_hides_no_effect() -> None:
     assert crossed_seeds(rows.iloc[1:], ["in.a"]) is None
 
 
+def test_runs_of_one_seed_are_not_taken_for_independent_ones() -> None:
+    """Two settings b of each of 20 draws a, with the noise of its draw: between the draws their means are compared,
+    within them b.  Of four draws, each with its own seed, nothing tells a from noise; it was "beyond chance"."""
+    rng = np.random.default_rng(15)
+    a, b, seeds = np.repeat([0.0, 1.0], 20), np.tile([0.0, 1.0], 20), np.repeat(np.arange(20), 2)
+    y = np.repeat(rng.normal(size=20), 2) + 0.3 * b + 0.05 * rng.normal(size=40)
+    rows = table(**{"in.a": a, "in.b": b, "m.estimate": y}).assign(seed=seeds)
+    axes = [{"name": n, "kind": "lhs", "unit": ""} for n in "ab"]
+    means = y.reshape(20, 2).mean(axis=1)
+    expected = [stats.ttest_ind(means[:10], means[10:]).pvalue, stats.ttest_rel(y[::2], y[1::2]).pvalue]
+    assert [e["p"] for e in main_effects(CampaignMeasures.of(rows, {}, axes))] == pytest.approx(expected, rel=1e-9)
+
+    few = rows.iloc[:8].assign(**{"in.a": np.repeat([0.1, 0.2, 0.3, 0.4], 2), "m.lo": y[:8] - 2.0, "m.hi": y[:8] + 2.0})
+    assert [e["p"] is None for e in main_effects(CampaignMeasures.of(few, {}, axes))] == [True, False]
+    shown = responses(CampaignMeasures.of(few, {}, axes))[0]["measures"][0]["quantities"]["estimate"]
+    assert np.subtract(shown["hi"], shown["lo"]) == pytest.approx(4.0) and shown["runs"] == [2, 2, 2, 2]
+
+
 def test_axes_that_cannot_be_told_apart_claim_nothing() -> None:
     a = np.repeat([1.0, 2.0], 10)
     rows = table(**{"in.a": a, "in.b": 3.0 * a, "m.estimate": a + np.random.default_rng(1).normal(size=20)})

@@ -37,23 +37,28 @@ def levels(rows: Any, column: str) -> tuple[list[str] | Array, Codes]:
     return unique, codes
 
 
-def response(y: Array, codes: Codes, count: int, own: tuple[Array, Array] | None = None, widened: float = 1.0) -> Json:
+def response(
+    y: Array, codes: Codes, count: int, own: tuple[Array, Array] | None = None, widened: float = 1.0,
+    seeds: Codes | None = None,
+) -> Json:  # fmt: skip
     """Return mean, 95 % interval and number of runs at each level.
 
-    The interval is Student's t of the dispersion within the level, ``widened`` for what was fitted before; at a level
-    of one run it is the run's own interval (lo, hi) where it is known.
+    The interval is Student's t of the dispersion within the level, ``widened`` for what was fitted before; runs of one
+    seed have the same noise and count as one.  At a level of one it is the run's own interval (lo, hi), where known.
     """
     out: Json = {"mean": [], "lo": [], "hi": [], "runs": []}
     for k in range(count):
         at = np.flatnonzero((codes == k) & np.isfinite(y))
-        n, low, high = len(at), None, None
-        mean = float(y[at].mean()) if n else None
+        low, high = None, None
+        mean = float(y[at].mean()) if len(at) else None
+        independent = y[at] if seeds is None else np.array([y[at][seeds[at] == s].mean() for s in np.unique(seeds[at])])
+        n = len(independent)
         if mean is not None and n > 1:
-            half = widened * float(stats.t.ppf(0.975, n - 1) * y[at].std(ddof=1) / np.sqrt(n))
+            half = widened * float(stats.t.ppf(0.975, n - 1) * independent.std(ddof=1) / np.sqrt(n))
             low, high = mean - half, mean + half
-        elif n == 1 and own is not None and np.isfinite(own[0][at[0]]) and np.isfinite(own[1][at[0]]):
-            low, high = float(own[0][at[0]]), float(own[1][at[0]])
-        for key, value in zip(out, (mean, low, high, n), strict=True):
+        elif n == 1 and own is not None and np.isfinite([own[0][at], own[1][at]]).all():
+            low, high = (float(end[at].mean()) for end in own)
+        for key, value in zip(out, (mean, low, high, len(at)), strict=True):
             out[key].append(value)
     return out
 
@@ -67,6 +72,7 @@ def responses(measures: CampaignMeasures) -> list[Json]:
     rows = measures.done
     axes = measures.factors()
     coded = [levels(rows, f"in.{axis['name']}") for axis in axes]
+    seeds = shared_seeds(rows)
     found: list[Json] = []
     for axis, (at, _) in zip(axes, coded, strict=True):
         numeric = not isinstance(at, list)
@@ -82,7 +88,7 @@ def responses(measures: CampaignMeasures) -> list[Json]:
                 own = numbers(rows, f"{name}.lo") - shift, numbers(rows, f"{name}.hi") - shift
             adjusted_for = _without_others(y, [codes for _, codes in coded])
             for entry, (at, codes), (rest, widened) in zip(found, coded, adjusted_for, strict=True):
-                entry["measures"][-1]["quantities"][key] = response(rest, codes, len(at), own, widened)
+                entry["measures"][-1]["quantities"][key] = response(rest, codes, len(at), own, widened, seeds)
     return found
 
 
@@ -122,28 +128,37 @@ def crossed_seeds(rows: Any, columns: list[str]) -> Codes | None:
     return codes
 
 
+def shared_seeds(rows: Any) -> Codes | None:
+    """Return the seed of each row as a number where several rows have one seed; else None."""
+    seeds = rows["seed"]
+    if seeds.isna().any() or seeds.is_unique:
+        return None
+    codes: Codes = np.unique(seeds.to_numpy(dtype=float), return_inverse=True)[1]
+    return codes
+
+
 def main_effects(measures: CampaignMeasures) -> list[Json]:
     """Return for each quantity and axis the span of the adjusted means, the share of the variance, and p of no effect.
 
     Additive model of all axes by least squares; the partial F test of an axis compares it with the model without it,
-    so that what several axes share is claimed by none.  Its residual holds interactions and noise.  Where every setting
-    was run with the same seeds, the seeds are blocks: noise common to the settings cancels.  p are adjusted together by
-    Holm.  p is None where no degrees of freedom are left, or the axis is a combination of others.
+    so that what several axes share is claimed by none.  Its residual holds interactions and noise.  Runs of
+    one seed have the same noise: an axis that varies among them is tested within the seeds, where it cancels, any other
+    between their means.  p are adjusted together by Holm.  p is None where no degrees of freedom are left, or the axis
+    is a combination of others.
     """
     rows = measures.done
     factors = measures.factors()
     columns = [f"in.{axis['name']}" for axis in factors]
     coded = [levels(rows, c) for c in columns]
-    blocks = crossed_seeds(rows, columns)
+    seeds = shared_seeds(rows)
     found: list[Json] = []
     for name in measures.names:
         for key, y in quantities(rows, name).items():
             good = np.isfinite(y)
             if good.sum() < 3:
                 continue
-            whole = blocks if good.all() else None
             designs = [_dummies(codes[good]) for _, codes in coded]
-            tests = _partial_tests(y[good], designs, whole)
+            tests = _partial_tests(y[good], designs, None if seeds is None else seeds[good])
             rests = [rest for rest, _ in _without_others(y, [codes for _, codes in coded])]
             for axis, (_, codes), rest, (share, p) in zip(factors, coded, rests, tests, strict=True):
                 means = [rest[good & (codes == k)].mean() for k in np.unique(codes[good])]
@@ -166,21 +181,41 @@ def _dummies(codes: Codes) -> Array:
     return np.asarray((codes[:, None] == present[None, 1:]).astype(float))
 
 
-def _partial_tests(y: Array, designs: list[Array], blocks: Codes | None) -> list[tuple[float | None, float | None]]:
-    """Return the share of the sum of squares that each factor alone explains, and the p of its F test."""
-    scale = float(np.abs(y).max())
-    if blocks is None:
-        centred = y - y.mean()
-        used = 1
-    else:  # balanced, so the factors stay as they are but for their means
-        centred = y - (np.bincount(blocks, y) / np.bincount(blocks))[blocks]
-        used = int(blocks.max()) + 1
-    designs = [d - d.mean(axis=0) for d in designs]
-    total = float(((y - y.mean()) ** 2).sum())
+Test = tuple[float | None, float | None]  # share of the sum of squares that a factor alone explains, p of its F test
+
+
+def _partial_tests(y: Array, designs: list[Array], seeds: Codes | None) -> list[Test]:
+    """Return the test of each factor: where runs share seeds, of factors that vary within them and of the others."""
+    n, scale = len(y), float(np.abs(y).max())
+    total, negligible = float(((y - y.mean()) ** 2).sum()), n * (ROUNDING * scale) ** 2
+    if seeds is None:
+        return _f_tests(y - y.mean(), [d - d.mean(axis=0) for d in designs], n - 1, total, negligible)
+    seeds = np.unique(seeds, return_inverse=True)[1]
+    count = np.bincount(seeds)
+
+    def mean(x: Array) -> Array:
+        sums = np.zeros((len(count), x.shape[1]))
+        np.add.at(sums, seeds, x)
+        return np.asarray((sums / count[:, None])[seeds])
+
+    within = [bool(np.abs(d - mean(d)).max(initial=0.0) > ROUNDING) for d in designs]
+    inside = [d - mean(d) for d, inner in zip(designs, within, strict=True) if inner]
+    centred = y - mean(y[:, None])[:, 0]
+    tests = iter(_f_tests(centred, inside, n - len(count), total, negligible))
+    if inside:  # what the inner factors do is taken out before the means are
+        x = np.hstack([d for d, inner in zip(designs, within, strict=True) if inner])
+        y = y - x @ np.linalg.lstsq(np.hstack(inside), centred, rcond=1e-10)[0]
+    means = mean((y - y.mean())[:, None])[:, 0]
+    outside = [d - d.mean(axis=0) for d, inner in zip(designs, within, strict=True) if not inner]
+    others = iter(_f_tests(means, outside, len(count) - 1, total, negligible))
+    return [next(tests if inner else others) for inner in within]
+
+
+def _f_tests(centred: Array, designs: list[Array], freedom: int, total: float, negligible: float) -> list[Test]:
+    """freedom: of the centred values; total: sum of squares of all; negligible: that of the arithmetic."""
     whole, rank = _residual(centred, designs)
-    freedom = len(y) - used - rank
-    negligible = len(y) * (ROUNDING * scale) ** 2
-    tests: list[tuple[float | None, float | None]] = []
+    freedom -= rank
+    tests: list[Test] = []
     for k in range(len(designs)):
         without, lower = _residual(centred, [d for i, d in enumerate(designs) if i != k])
         explained, df = max(without - whole, 0.0), rank - lower
@@ -189,7 +224,7 @@ def _partial_tests(y: Array, designs: list[Array], blocks: Codes | None) -> list
         elif total <= negligible or explained <= negligible:
             tests.append((0.0, 1.0))
         else:
-            f = explained / df / max(whole / freedom, negligible / len(y))
+            f = explained / df / max(whole / freedom, negligible / len(centred))
             tests.append((explained / total, float(stats.f.sf(f, df, freedom))))
     return tests
 
