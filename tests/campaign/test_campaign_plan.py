@@ -55,6 +55,7 @@ def test_values_as_a_person_writes_them(text: str, unit: str, shown: list[Any]) 
         ("0..1deg, 2", "some values have a unit and some have none"),
         ("1deg,2s", "does not convert"),
         ("1..2:1", "a grid has 2 to 1000000 points"),
+        ("0deg..80deg", r"how many values\? write LOW..HIGH:N, such as 0deg..80deg:9"),
         ("-1..2:5log", "must be > 0"),
         ("gauss(0, 1)", "no such distribution; there are: uniform, normal"),
         ("uniform(1)", "takes 2 numbers"),

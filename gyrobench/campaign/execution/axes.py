@@ -27,6 +27,7 @@ LONGEST = 200  # letters of a grid or a distribution: what is longer is a list, 
 NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 QUANTITY = re.compile(rf"({NUMBER})\s*(.*)", re.S)
 _GRID = re.compile(rf"({NUMBER})\s*(\S*?)\s*\.\.\s*({NUMBER})\s*(\S*?)\s*:\s*(\d+)\s*(log)?\b\s*(.*)", re.S)
+_ENDS = re.compile(rf"{NUMBER}\s*\S*?\s*\.\.\s*{NUMBER}\s*[^\s:]*")  # a grid without its number of values
 _CALL = re.compile(r"([a-z]+)\s*\((.*)\)\s*(.*)", re.S)
 
 
@@ -127,7 +128,11 @@ def _one_unit(name: str, found: Sequence[tuple[float, str]], tail: str) -> tuple
 
 
 def _grid(name: str, text: str) -> Axis | None:
-    match = _GRID.fullmatch(text.strip()) if len(text) <= LONGEST else None
+    if len(text) > LONGEST:
+        return None
+    match = _GRID.fullmatch(text.strip())
+    if match is None and _ENDS.fullmatch(text.strip()):
+        raise UsageError(f"{name}: {text}: how many values? write LOW..HIGH:N, such as {text.strip()}:9")
     if match is None:
         return None
     low_text, low_unit, high_text, high_unit, count, log, tail = match.groups()
