@@ -42,6 +42,7 @@ SPELLED = {
     "sekunde": "s", "sekunden": "s", "minutes": "min", "minuten": "min", "std": "h", "hours": "h", "stunden": "h",
     "c": "degC", "°c": "degC", "volt": "V", "volts": "V", "ampere": "A", "milliampere": "mA", "kelvin": "K",
 }  # fmt: skip
+WORD = re.compile(r"[^\W\d_]{3,}")
 #: end of a name without a unit beside it, as loggers write it: gx_dps, ts_us -> unit
 ENDINGS = {
     "dps": "dps", "mdps": "mdps", "degs": "deg/s", "deg_s": "deg/s", "rads": "rad/s", "rad_s": "rad/s", "degh": "deg/h",
@@ -205,11 +206,12 @@ def _read_unit(text: str) -> str | None:
     text = text.strip("[]() ")
     text = text.rstrip(".")  # Sek., deg.
     text = SPELLED.get(text.casefold(), text)
-    with suppress(units.UnitError):
-        if text in ("", "-"):
-            return ""
-        units.unit(text)
-        return text
+    if text in ("", "-"):
+        return ""
+    for one in (text, WORD.sub(lambda word: SPELLED.get(word[0].casefold(), word[0]), text)):  # Grad/s, °/Std
+        with suppress(units.UnitError):
+            units.unit(one)
+            return one
     return None
 
 

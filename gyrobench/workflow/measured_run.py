@@ -99,7 +99,7 @@ def find_faults(system: System, data: Path, values: Mapping[str, str], columns: 
 
 def _fitting(system: System, data: Path) -> list[Advice]:
     """Return the command that proposes a column map, where one finds columns in a file with a layout of its own: other
-    names, rows above or below them, times of day.
+    names, rows above or below them, times of day, units spelled out.
     """
     from gyrobench.record.csv_reader import read_head
     from gyrobench.workflow.fit_columns import propose_columns
@@ -112,8 +112,9 @@ def _fitting(system: System, data: Path) -> list[Advice]:
             for name, c in found.items()
         )
         timed = any(column.time for column in found.values())
-        head = read_head(proposal.text_file).line
-        if not (named and layout.names) or timed or layout.below or (found and head != layout.skip + 1):
+        spelled = any(column.unit and column.written.strip("[]() ") != column.unit for column in found.values())
+        own = not (named and layout.names) or timed or spelled or layout.below
+        if own or (found and read_head(proposal.text_file).line != layout.skip + 1):
             out = f"{data.stem}.toml"
             fit = shlex.join(["gyrobench", "fit", display_path(data), "--system", system.name, "--out", out])
             return [Advice("fit", f"the file has a layout of its own; {fit} proposes a column map for --columns")]

@@ -110,6 +110,7 @@ def test_a_layout_of_its_own_is_pointed_to(tmp_path: Path, monkeypatch: pytest.M
         "merged": ["Zeit,,Strom", names, *rows],
         "stamps": [names, *(f"{stamps[k]},{stamps[k + 1]},0.0{k + 10}" for k in range(12))],
         "word": [names, *rows, "720,780,off"],
+        "spelled": [names.replace("mA", "Milliampere"), *rows],
     }
     advised = {}
     for name, lines in layouts.items():
@@ -118,7 +119,7 @@ def test_a_layout_of_its_own_is_pointed_to(tmp_path: Path, monkeypatch: pytest.M
         with pytest.raises(DataError) as error:
             reduce_measured(load_system("fixed_position"), file, {}, in_memory=True)
         advised[name] = [a.action for a in error.value.advice]
-    assert advised == {"units": ["fit"], "merged": ["fit"], "stamps": ["fit"], "word": []}
+    assert advised == {"units": ["fit"], "merged": ["fit"], "stamps": ["fit"], "word": [], "spelled": ["fit"]}
     book = Workbook()
     for line in layouts["merged"]:
         book.active.append([float(c) if c[0].isdigit() else c for c in line.split(",") if c])

@@ -259,6 +259,8 @@ def test_day_and_month_are_asked_for_where_both_orders_fit(tmp_path: Path) -> No
         assert bool(problems) == any("may be exchanged" in p for p in problems) == asked, problems
     text, problems = proposed(tmp_path, "Beginn (Sec.),Ende (seconds),Strom [A]\n0,1,2\n1,2,3\n", "fixed_position")
     assert text.count('unit = "s"') == 2 and problems == []
+    text, problems = proposed(tmp_path, "t [s],Rate [Grad/Std]\n0,1\n1,2\n", "drift_record")
+    assert 'unit = "deg/h"' in text and problems == []
 
 
 def test_a_temperature_is_not_blamed_for_a_rate_without_unit(tmp_path: Path) -> None:
