@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gyrobench import reading
-from gyrobench.bench import Bench
+from gyrobench.bench import Bench, UsageError
 from gyrobench.files import sha256, write_whole
 from gyrobench.record.run_document import RecordError
 from gyrobench.report import calibration_certificate, certificate_page, load, render
@@ -33,7 +33,7 @@ def write_certificate(
     profile: of the laboratory, default ``laboratory.toml`` here or in the bench; out: default the working folder.
     language: default that of the profile.  digital: ``certificate-NUMBER.xml``, too, a Digital Calibration Certificate.
     charts: of a lot, drawn in the language of the certificate.  Raises VerificationError for a report that was changed,
-    UsageError for runs of different tests and a wrong profile.
+    UsageError for runs of different tests, a run twice and a wrong profile.
     """
     bench = Bench.find().folder
     laboratory = find_laboratory(profile)
@@ -42,6 +42,9 @@ def write_certificate(
         verify(require_run(folder))
         result = load(reading.read_text(folder / "result.json", RecordError))
         of.append(Certified(Report.of(result), sha256(folder / MANIFEST)))
+    digests = [one.digest for one in of]
+    if twice := [folder for folder, digest in zip(runs, digests, strict=True) if digests.count(digest) > 1]:
+        raise UsageError(f"certificate: {twice[0]} and {twice[1]} are one report; a lot names each once")
     language = language and check_code(language)
     page = certificate_page.page(of, laboratory, number, language, bench, charts)
     made = {"html": render.html(page, bench).encode(), "pdf": render.pdf(page, bench)}

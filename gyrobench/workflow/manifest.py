@@ -133,7 +133,9 @@ def _check_signature(folder: Path, key: Path) -> None:
     except ValueError:
         public = None
     if not isinstance(public, ed25519.Ed25519PublicKey):
-        raise SigningError(f"{key}: no public Ed25519 key in PEM; gyrobench sign --new-key makes one")
+        part = key.with_suffix(".pub")
+        way = f"its public part is {part}" if part != key and part.is_file() else "gyrobench sign --new-key makes one"
+        raise SigningError(f"{key}: no public Ed25519 key in PEM; {way}")
     try:
         signature = (folder / SIGNATURE).read_bytes()
     except FileNotFoundError:

@@ -10,9 +10,11 @@ import pytest
 from messy_file import messy
 from typer.testing import CliRunner
 
+from gyrobench.bench import UsageError
 from gyrobench.campaign.execution.store import Campaign
 from gyrobench.commands.cli import app
 from gyrobench.record.record import Record
+from gyrobench.workflow.certificate import write_certificate
 
 pytestmark = pytest.mark.long
 
@@ -84,6 +86,8 @@ def test_two_commands_to_the_certificate(tmp_path: Path, monkeypatch: pytest.Mon
     (page,) = tmp_path.glob("certificate-*.html")
     assert page.name in said and "Left out for an empty cell: row 18." in page.read_text("utf-8")
     assert "Prüflabor, Beispielweg 1" in page.read_text("utf-8") and "messung.csv" in page.read_text("utf-8")
+    with pytest.raises(UsageError, match="out and out are one report; a lot names each once"):
+        write_certificate([Path("out"), Path("out")])
 
 
 def test_twenty_files_to_the_certificate_of_the_lot_in_one_command(
