@@ -201,7 +201,7 @@ def _command(report: JobReport, request: CommandRequest, writer: _Writer) -> Non
             process.send_signal(signal.SIGINT)
             raise
     pages = Bench.find().out / request.folder
-    report.folder = str(pages) if request.folder and pages.is_dir() else ""
+    report.folder = str(pages) if request.folder and any(pages.glob("**/*.html")) else ""
     report.state = "done" if process.returncode in (0, 1) else "failed"
 
 

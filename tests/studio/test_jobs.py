@@ -25,7 +25,7 @@ from gyrobench.report.page_model import Page
 from gyrobench.studio import job_process
 from gyrobench.studio.job_process import LIVE, REQUEST, STARTED, JobReport
 from gyrobench.studio.jobs import StudioJob, StudioJobs
-from gyrobench.studio.request import JobRequest, comparison_command, comparison_python, read_request
+from gyrobench.studio.request import CommandRequest, JobRequest, comparison_command, comparison_python, read_request
 from gyrobench.workflow.user_errors import PostRunError, record_kept
 
 SHORT = JobRequest("fixed_position", {"dwell": "60s"}, seed=3)
@@ -153,6 +153,9 @@ def test_a_run_that_a_killed_studio_has_just_started_is_not_lost(jobs: StudioJob
 def test_what_cannot_run_says_why(jobs: StudioJobs) -> None:
     failed = until(jobs, jobs.submit(JobRequest("fixed_position", {"latitude": "3 kg"})), ended)
     assert failed.state == "failed" and "latitude" in failed.report.message
+    words = ["sweep", "fixed_position", "--over=latitude=0deg..80deg", "--out=reports/out/campaigns/x"]
+    sweep = until(jobs, jobs.submit(CommandRequest(words, folder="campaigns/x")), ended)
+    assert sweep.state == "failed" and sweep.report.folder == "", "a folder without pages is no link to them"
     missing = until(jobs, jobs.submit(JobRequest("fixed_positio")), ended)
     assert "did you mean fixed_position?" in missing.report.message and not missing.resumable
 
