@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +55,7 @@ class Laboratory(BaseModel):
     address: list[str] = Field(min_length=1)
     accreditation: str = ""
     logo: str = ""
-    country: str = Field(default="", pattern="^([A-Z]{2})?$")
+    country: str = ""
     statements: list[str] = []
     coefficients: list[str] = []
     language: str = ENGLISH
@@ -65,6 +66,13 @@ class Laboratory(BaseModel):
     def picture(self) -> str:
         """The logo as a data URI; "" where there is none."""
         return self._picture
+
+    @field_validator("country")
+    @classmethod
+    def _of_two_letters(cls, code: str) -> str:
+        if not re.fullmatch("([A-Z]{2})?", code):
+            raise ValueError("two capital letters are expected, such as DE")
+        return code
 
     @field_validator("language")
     @classmethod

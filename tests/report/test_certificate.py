@@ -103,11 +103,13 @@ def test_all_that_is_wrong_with_a_profile_is_named(tmp_path: Path) -> None:
     file = tmp_path / "laboratory.toml"
     with pytest.raises(UsageError, match="no profile of a laboratory"):
         read_laboratory(file)
-    file.write_text('name = 5\nadress = ["x"]\n[[signatories]]\nrol = "Head"\n')
+    file.write_text('name = 5\nadress = ["x"]\ncountry = "Germany"\nlanguage = "de"\n[[signatories]]\nrol = "Head"\n')
     with pytest.raises(UsageError) as error:
         read_laboratory(file)
     text = str(error.value)
     assert "name = 5: " in text and "address: field required" in text, text
+    assert "country = 'Germany': two capital letters are expected, such as DE" in text, text
+    assert "language = 'de': no such language; there are: en" in text, text
     assert "adress: unknown key; did you mean address?" in text and "0.rol: unknown key" in text, text
 
 

@@ -95,7 +95,8 @@ def test_a_wrong_value_is_said_where_it_is_written(page: Any, studio: tuple[str,
     page.locator(".q-field__messages").get_by_text("write for example latitude=45.75deg").wait_for()
     page.get_by_role("button", name="Run").click()
     page.locator(".q-notification").wait_for()
-    assert "/system/" in page.url
+    lines = "getComputedStyle(document.querySelector('.q-notification__message')).whiteSpace"
+    assert "/system/" in page.url and page.evaluate(lines) == "pre-line"  # a list of faults has a line for each
 
 
 def test_what_is_not_there_is_said_with_what_is_near(page: Any, studio: tuple[str, Path]) -> None:
