@@ -41,7 +41,7 @@ def identify(
         ),
     ] = None,
     twin: Annotated[
-        Path | None, typer.Option("--twin", metavar="FILE", help="Write the parameters as values for --set @FILE.")
+        Path | None, typer.Option("--twin", metavar="FILE.toml", help="Write the parameters as values for --set @FILE.")
     ] = None,
     want: Annotated[
         list[str] | None,
