@@ -146,7 +146,8 @@ def _lines(summary: dict[str, Any]) -> list[str]:
     before = f" ({summary['stored_before']:,} were stored before)" if summary["stored_before"] else ""
     lines = [f"{summary['runs']:,} runs: {counts}{before}"]
     if summary["equal_points"]:
-        lines.append(f"{summary['equal_points']:,} points of the plan are the run of another point")
+        words = "point of the plan is" if summary["equal_points"] == 1 else "points of the plan are"
+        lines.append(f"{summary['equal_points']:,} {words} the run of another point")
     if summary["verdicts"]:
         lines.append("verdicts: " + ", ".join(f"{n:,} {v}" for v, n in summary["verdicts"].items()))
     for state, reasons in summary["reasons"].items():

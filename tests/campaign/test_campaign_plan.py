@@ -183,6 +183,14 @@ def test_what_a_measured_record_may_say_can_be_said_of_a_lot(tmp_path: Path) -> 
             make_plan(from_mapping(asked))
 
 
+def test_a_file_that_is_there_twice_is_named(tmp_path: Path) -> None:
+    """Under two names, as a copied one of a lot: one run, and the lot is smaller than it looks."""
+    for name, text in (("a", "1.0\n"), ("b", "2.0\n"), ("c", "1.0\n")):
+        (tmp_path / f"{name}.csv").write_text(text, encoding="utf-8")
+    plan = make_plan(from_mapping({"system": "weighing", "data": str(tmp_path / "*.csv")}))
+    assert len(plan.runs) == 2 and plan.notes == ["c.csv holds what a.csv holds: the two count once"]
+
+
 LOOP = {"system": "platform_single_axis", "over": {"platform.J": "2,4 kg.m2"}, "set": {"hold": "10s"}}
 
 

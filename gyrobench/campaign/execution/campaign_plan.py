@@ -149,7 +149,9 @@ class _Planner:
         runs: dict[str, PlannedRun] = {}
         for index, (shown, given, parts, file, seed) in enumerate(points):
             run = self._run(index, shown, given, parts, file, seed)
-            runs.setdefault(run.run, run)
+            first = runs.setdefault(run.run, run)
+            if first is not run and file is not None and first.data:
+                self.notes.append(f"{file.name} holds what {Path(first.data).name} holds: the two count once")
         setups = [assigned for _, assigned, _ in self.setups.values()]
         seeds = d.seed_list()
         described = [a.as_dict() for a in axes]
