@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    __version__: str
     from gyrobench.library import (
         Comparison,
         Experiment,
@@ -46,6 +47,10 @@ if not TYPE_CHECKING:  # a type checker would take any name for one of the modul
 
     def __getattr__(name: str) -> Any:
         """Import what is used of the library."""
+        if name == "__version__":
+            from importlib.metadata import version
+
+            return version("gyrobench")
         if name not in __all__:
             raise AttributeError(f"module 'gyrobench' has no attribute '{name}'; it offers {', '.join(__all__)}")
         import importlib
@@ -54,4 +59,4 @@ if not TYPE_CHECKING:  # a type checker would take any name for one of the modul
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *__all__, "__version__"})

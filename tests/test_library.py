@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-import importlib
+import importlib.metadata
 import json
 import re
 import signal
@@ -57,6 +57,7 @@ def test_every_name_of_the_face_is_there_and_others_are_not() -> None:
     for room in ("campaign", "design"):
         importlib.import_module(f"gyrobench.{room}")
     assert {n for n in gb.__all__ if callable(getattr(gb, n))} == set(gb.__all__) <= set(dir(gb))
+    assert gb.__version__ == importlib.metadata.version("gyrobench") and "__version__" in dir(gb)
     with pytest.raises(AttributeError, match="module 'gyrobench' has no attribute 'laod'; it offers"):
         gb.laod  # noqa: B018
 
