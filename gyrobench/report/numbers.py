@@ -41,7 +41,7 @@ def write_number(
 
     ``u`` that is None, zero or not finite counts as none.  A value that is None or not finite gives a
     dash.  Very small and very large numbers are written with a power of ten, unless a number of at
-    most six decimals (nine from 0.1 on) would do.
+    most six decimals (nine from 0.01 on) would do.
     """
     if value is None or isinstance(value, str) or not math.isfinite(value):
         return FormattedNumber(NOTHING, "", "")
@@ -53,7 +53,7 @@ def write_number(
         digits = decimals(u)
         size = max(abs(value), abs(u))
         significant = max(1, digits + _exponent(size) + 1)
-        if (digits <= 6 or (digits <= 9 and size >= 0.1)) and size < 1e7:
+        if (digits <= 6 or (digits <= 9 and size >= 0.01)) and size < 1e7:
             return _fixed(value, digits, full)
         return _power(value, significant, _exponent(size), full)
     if value == 0.0:

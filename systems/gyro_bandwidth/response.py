@@ -56,11 +56,11 @@ class GyroResponse:
     @classmethod
     def of(cls, f: Array, value: Complex, u: Array, held: float = 0.0, known: bool = True) -> GyroResponse:
         """Return the response of complex points, of samples at their own times where they are held; the phase is
-        continuous, that of the lowest within half a turn.
+        continuous (_continuous), that of the lowest within half a turn.
         """
         order = np.argsort(f)
         f, value, u = f[order], value[order], u[order]
-        gain, phase = np.vstack([np.log(np.abs(value)), np.unwrap(np.angle(value))]) + hold(f, held)
+        gain, phase = np.vstack([np.log(np.abs(value)), _continuous(f, np.angle(value))]) + hold(f, held)
         return cls(f, gain, phase, u, held, known)
 
     def moved(self, change: Complex) -> GyroResponse:
@@ -75,6 +75,21 @@ class GyroResponse:
     def at(self, factor: float) -> GyroResponse:
         """Return the response with all frequencies times a factor."""
         return replace(self, f=self.f * factor, held=self.held / factor)
+
+
+def _continuous(f: Array, phase: Array) -> Array:
+    """Return the phase with the turns that wrapping took off: each as near as it comes to the one before times the
+    ratio of the frequencies, which a delay makes of it, however many turns there are from point to point.
+
+    Counted from the phase at frequency zero, a multiple of 90 degrees: of a rate, of another sense, of an angle.
+    """
+    near = np.unwrap(phase[:3])
+    out = phase.copy()
+    zero = 0.5 * math.pi * round(float(np.polyval(np.polyfit(f[:3], near, 1), 0.0)) / (0.5 * math.pi))
+    for k in range(1, f.size):
+        expected = zero + (out[k - 1] - zero) * f[k] / f[k - 1]
+        out[k] += 2.0 * math.pi * round((expected - out[k]) / (2.0 * math.pi))
+    return out
 
 
 def hold(f: Array, time: float) -> Array:
@@ -262,15 +277,21 @@ def _starts(r: GyroResponse, poles: int) -> Iterator[list[float]]:
         yield start + ([corner + 2.0 * abs(spread)] if poles % 2 else [])
 
 
+def _tangents(r: GyroResponse, c: PoleCurve) -> Array:
+    """Return an orthonormal basis (2 n, parameters) of what the parameters of a curve change, over u of the points."""
+    steps = np.diag(1e-5 * c.size)
+    J = np.column_stack([((c.at(r.f, c.p + d) - c.at(r.f, c.p - d)) / d.sum() / r.u).ravel() for d in steps])
+    out: Array = np.linalg.qr(J / np.linalg.norm(J, axis=0))[0]
+    return out
+
+
 def _with_resonance(r: GyroResponse, c: PoleCurve, least: float) -> PoleCurve | None:
     """Return a curve with the resonance that its residuals show best; None where none promises a criterion below least.
 
     Small a and c are linear in them: of each frequency and damping by least squares beside the curve's own parameters.
     """
     left = ((np.vstack([r.gain, r.phase]) - c.at(r.f)) / r.u).ravel()
-    steps = np.diag(1e-5 * c.size)
-    J = np.column_stack([((c.at(r.f, c.p + d) - c.at(r.f, c.p - d)) / d.sum() / r.u).ravel() for d in steps])
-    own = np.linalg.qr(J / np.linalg.norm(J, axis=0))[0]
+    own = _tangents(r, c)
     corners = np.log(2.0 * math.pi * np.geomspace(r.f[0], r.f[-1], 4 * r.f.size))
     b, z = (v.reshape(-1, 1) for v in np.meshgrid(corners, np.log(DAMPING)))
     s = 2j * np.pi * r.f
@@ -285,6 +306,16 @@ def _with_resonance(r: GyroResponse, c: PoleCurve, least: float) -> PoleCurve | 
     if not _criterion(r, max(c.chi2 - float(gained[k]), 0.0), c.p.size + 4) < least:
         return None
     return fitted(r, c.poles, np.array([*c.p, *b[k], *z[k], *a[k]]))
+
+
+def _next_pole(r: GyroResponse, c: PoleCurve, f3: float) -> float:
+    """Return the change of the order at f3, Hz, by the pole far above that the noise leaves room for: of one standard
+    uncertainty of q in the gain (1 + q w2)^-1/2, whose phase is that of a delay.  NaN where f3 is.
+    """
+    column = np.concatenate([-2.0 * (math.pi * r.f) ** 2 / r.u, np.zeros(r.f.size)])
+    own = _tangents(r, c)
+    size = float(np.linalg.norm(column - own @ (own.T @ column)))
+    return 2.0 * (2.0 * math.pi * f3) ** 2 * math.sqrt(max(1.0, c.chi2 / c.dof)) / size
 
 
 def _absent(rest: Array, top: float) -> bool:
@@ -336,4 +367,6 @@ def figures(r: GyroResponse, choose: Callable[[list[PoleCurve]], PoleCurve] | No
         other, wider = more.values(more.p), more.variances()
         beyond = (other - value) ** 2 - np.maximum(wider - variance, 0.0)
         shape = np.sqrt(np.maximum(np.nan_to_num(beyond), 0.0))
+    if best.shape == (1, False):  # whose order is 1 whatever its corner
+        shape[4] = math.hypot(shape[4], _next_pole(r, best, float(value[1])))
     return Figures(value, np.sqrt(variance), shape, best)

@@ -40,6 +40,8 @@ def test_decimals_show_two_digits_of_u(u, digits):
         (0.5, 0.0, "0.5"),  # an uncertainty of zero says nothing about digits
         (0.5, math.nan, "0.5"),
         (7, 0.1, "7"),
+        (0.0499916, 9.3e-6, "0.0499916"),  # nine decimals from 0.01 on
+        (0.00499916, 9.3e-8, "4.999160·10⁻³"),
     ],
 )
 def test_written(value, u, text):

@@ -80,6 +80,31 @@ def test_a_butterworth_has_its_order(order: int) -> None:
     assert r.value[3] == pytest.approx(-phase[1] / w[1], rel=2e-3)
 
 
+@pytest.mark.parametrize("gap", [(0.0, 0.0), (15.0, 111.0)])
+def test_a_phase_that_turns_between_points(gap: tuple[float, float]) -> None:
+    """A link that is 30 ms late: 1.3 turns from 157 to 200 Hz; one of 4 ms and a gap: 138 degrees by it, 117 by two
+    poles of 40 Hz.  Continuous: -w T - arctan2(1.4 x, 1 - x2), x = f/40 Hz.
+    """
+    f = np.geomspace(1.0, 200.0, 23)
+    f = f[(f <= gap[0]) | (f >= gap[1])]
+    late = 0.004 if gap[1] else 0.03
+    x = f / 40.0
+    r = RESPONSE.GyroResponse.of(f, np.exp(-2j * np.pi * f * late) / (1.0 + 1.4j * x - x * x), np.full(f.size, 1e-3))
+    assert r.phase == pytest.approx(-2.0 * np.pi * f * late - np.arctan2(1.4 * x, 1.0 - x * x))
+    assert RESPONSE.figures(r).value[3] == pytest.approx(late + 1.4 / (80.0 * math.pi), rel=1e-6)
+
+
+def test_the_order_of_one_pole_is_not_known_exactly() -> None:
+    """A second pole at 2 kHz is below the noise: 2 f^2 [1/(f^2 + 40^2) + 1/(f^2 + 2000^2)] = 1.0004 at -3 dB, not 1."""
+    f = np.geomspace(1.0, 200.0, 25)
+    noise = np.random.default_rng(3).normal(size=(2, f.size)) * 3e-3
+    value = np.exp(noise[0] + 1j * noise[1]) / ((1.0 + 1j * f / 40.0) * (1.0 + 1j * f / 2000.0))
+    r = RESPONSE.figures(RESPONSE.GyroResponse.of(f, value, np.full(f.size, 3e-3)))
+    assert r.curve.shape == (1, False)
+    assert 1e-4 < r.u[4] < 1e-2
+    assert abs(r.value[4] - 1.0004) < 2.0 * r.u[4]
+
+
 @pytest.mark.long
 def test_random_responses_come_back() -> None:
     """24 low-passes with a delay, noise of 0.3 %: z of all figures, chi2 of 96 within 4 standard deviations."""
