@@ -169,13 +169,19 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
         return out
 
     def test(self, found: Findings) -> None:
-        """Add an F test of the fourth power of the level."""
-        power = np.column_stack([self.s2**2 / float(np.max(self.s2)) ** 2])
+        """Add F tests of the fourth power of the level, and of what differs up and down beyond the model."""
+        top = float(np.max(self.s2))
         found.f_test(
-            "level.fourth", "fourth power of the level", power, "shape over the level",
+            "level.fourth", "fourth power of the level", self.s2[:, None] ** 2 / top**2, "shape over the level",
             "the readings do not go with the mean square of the vibration",
             "the readings go with the mean square of the vibration",
         )  # fmt: skip
+        if self.both:
+            found.f_test(
+                "level.odd", "up against down over the level", self.odd / top ** (1 if self.channel == GYRO else 2),
+                "shape over the level", "up and down differ at high levels in a way that no gravity makes",
+                "up and down differ as gravity makes it",
+            )  # fmt: skip
         if np.any(late := self.late()):
             found.f_test(
                 "level.late", "step of the level before", late[:, None], "readings before the level was reached",
@@ -184,22 +190,37 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
             )  # fmt: skip
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
-        """Add what the coefficients may be with effects that noise explains as well: a fourth power of the level, and
-        what fades after the axis was turned over, as heat that another attitude moves does.
+        """Add what the coefficients may be with effects that noise explains as well: a fourth power of the level, one
+        against gravity, and what fades after the axis was turned over, as heat that another attitude moves does.
         """
-        told = next((t.p for t in self.found.tests if t.id == "level.fourth"), None)
+        gyro = self.channel == GYRO
         text = (
-            f"{'G2' if self.channel == GYRO else 'K2'} may hold a fourth power of the level, and its interval is wider "
+            f"{'G2' if gyro else 'K2'} may hold a fourth power of the level, and its interval is wider "
             "with it. Take more levels, or leave out the highest."
         )
-        fourth = self._with(result, "level.fourth.with", text, self.s2[:, None] ** 2)
-        if told is not None and told < SHOWN:
-            fourth = [replace(r, severity="warning") for r in fourth]
-        return replace(result, reasons=[*result.reasons, *fourth, *(self._faded(result) if self.both else [])])
+        reasons = self._with(result, "level.fourth.with", text, self.s2[:, None] ** 2)
+        if self.both:
+            text = (
+                f"{'G' if gyro else 'S and K3'} may hold what changes with the level and with up and down, as readings "
+                "that are clipped at the ends of a range make it: intervals are wider with it. Take more levels, or "
+                "leave out the highest."
+            )
+            reasons += self._with(result, "level.odd.with", text, self.odd) + self._faded(result)
+        return replace(result, reasons=[*result.reasons, *reasons])
+
+    @property
+    def odd(self) -> Array:
+        """Return the column (n, 1) of what acts with the level against gravity: its square of a gyro, its fourth power
+        of an accelerometer, whose square is the cubic's.  Readings clipped at the ends of a range make it.
+        """
+        return (self.up * (self.s2 if self.channel == GYRO else self.s2**2))[:, None]
 
     def _with(self, result: DriftTestResult, id: str, text: str, more: Array) -> list[Reason]:
+        """Return that a verdict must hold with the columns too; a warning where their F test shows them."""
         intervals = intervals_with(*self.model, more, result.coefficients)
-        return [Reason(id, text, BOTH, severity="condition", intervals=intervals)] if intervals else []
+        told = next((t.p for t in self.found.tests if f"{t.id}.with" == id), None)
+        severity = "warning" if told is not None and told < SHOWN else "condition"
+        return [Reason(id, text, BOTH, severity=severity, intervals=intervals)] if intervals else []
 
     def _faded(self, result: DriftTestResult) -> list[Reason]:
         turns = np.concatenate([[0], np.flatnonzero(np.diff(self.up)) + 1])

@@ -306,6 +306,22 @@ def test_a_fourth_power_of_the_level_asks_a_verdict_to_hold_with_it() -> None:
     assert G2.estimate - 3.0 > 5.0 * G2.u
 
 
+def test_a_level_that_acts_against_gravity_asks_a_verdict_to_hold_with_it() -> None:
+    """Clipping takes 0.15 µg/g⁴ towards zero, up and down: K3 was 15 u below 1 µg/g³.  A G that rises with the level,
+    0.02 °/h/g³: G was 0.02 times the mean square of the levels, 3.5 g², too large.  With the column of it both hold.
+    """
+    table = shaken()
+    more = [[*r[:4], r[4] + r[2] * 0.02 * r[3] ** 2, r[5] - r[2] * 1.5e-7 * r[3] ** 4] for r in table]
+    for rows_, severity in ((table, "condition"), (more, "warning")):
+        result = reduced(rows_)
+        c = {x.name: x for x in result.coefficients}
+        for name, true, most in (("G", 12.0, 0.3), ("K3", 1.0, 3.0)):
+            reason = next(r for r in result.reasons if r.id == "level.odd.with" and name in r.intervals)
+            low, high = reason.intervals[name]
+            assert reason.severity == severity and low < true < high and high - low < most
+        assert (abs(c["K3"].estimate - 1.0) > 3.0 * c["K3"].u) == (severity == "warning")
+
+
 def test_an_axis_that_was_turned_over_once_is_said(tmp_path: Path) -> None:
     """A bias that is another one from then on is half in the bias and half in G, whatever the noise: 20 °/h make 10.
     With the first position once more it is a drift between positions, and u of G 15 times as large."""
