@@ -27,6 +27,7 @@ from gyrobench import frames
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.level_shift import jumped
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
@@ -54,6 +55,12 @@ STATUS = {2.0: "is ill-conditioned", 3.0: "contradicts the latitude", 4.0: "is o
 UNDETERMINED = (
     "the rates do not determine the heading: their horizontal part is below three times its uncertainty; take a longer "
     "time"
+)
+SAME = 0.02  # rad: angles of the head that are one position
+ONCE = Reason(
+    "positions.once",
+    "Each position was taken once: a bias that jumps between two of them (it is touched, heated, switched) turns the "
+    "heading, and no residual shows it. Take the first position once more at the end.",
 )
 THIRD = "take a third position, at 90° to the two (method four or several), which tells them apart"
 
@@ -258,6 +265,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
                 self._integrity(psi, A), *after.methods_table(s.density, s.time, s.settle, s.latitude, psi),
                 *after.table(s.instruments or {}, s.latitude, s.gravity, GYRO_BIAS.size(s)),
             ],
+            reasons=jumped(found),
         )  # fmt: skip
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
@@ -282,7 +290,16 @@ class Reduction(DriftReduction[NorthFinderSetup]):
             )
             reasons.append(Reason("gyro.bias.unstated", text, severity="error"))
             reasons.append(_doubt("gyro.bias", "The bias of the gyro is in the heading, and not in u.", "pass"))
+        if s.instruments is None and self._once():
+            reasons.append(ONCE)
         return replace(result, reasons=[*result.reasons, *reasons])
+
+    def _once(self) -> bool:
+        """Return whether two to four positions are taken, each once: a heading makes what a jump of the bias does."""
+        start, end = (np.asarray(self.windows[f"angle_{n}"], dtype=float) for n in ("start", "end"))
+        taken = start[np.concatenate([[True], np.abs(np.diff(start)) > SAME])]
+        apart = np.abs(np.exp(1j * taken[:, None]) - np.exp(1j * taken)) + np.eye(taken.size)
+        return bool(np.all(np.abs(end - start) < SAME) and 1 < taken.size < 5 and np.min(apart) > SAME)
 
     def _other(self, psi: float) -> float:
         """Return the other heading with the same rates of two positions, rad."""

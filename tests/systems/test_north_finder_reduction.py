@@ -16,6 +16,7 @@ from stated import with_sizes
 from gyrobench.reduction.estimation.verdict import conclude
 from gyrobench.result import DriftTestResult
 from gyrobench.system.system import load_system
+from gyrobench.units import DPH
 from systems.north_finder.reduction import NorthFinderSetup, Reduction
 
 
@@ -95,6 +96,24 @@ def test_two_positions_ask_for_the_side(
         assert "63." in said and "−63." in said.replace("-63.", "−63.")
     other = [row for t in result["tables"] if t["id"] == "integrity" for row in t["rows"] if "other" in row[0]]
     assert other[0][1] == pytest.approx(-result["coefficients"][0]["estimate"], abs=1e-9)
+
+
+@pytest.mark.parametrize(("angles", "said"), [((0, -90, -180, -270), True), ((0, -90, -180, -270, 0), False)])
+def test_positions_that_are_taken_once_are_said(angles: tuple[float, ...], said: bool) -> None:
+    """0.3 °/h more from the third position on: of four the model fits all of it, a half as bias and a half in cosine
+    and sine each, across a heading of 45°: 1.2° of it.  With the first once more the jump is named.
+    """
+    latitude, a = 0.8, np.radians(np.repeat(angles, 10))
+    noise = 0.01 * DPH * np.random.default_rng(2).normal(size=a.size)
+    A = 7.2921159e-5 * math.cos(latitude)
+    jump = DPH * 0.3 * (np.arange(a.size) >= 20)
+    t = 10.0 * np.arange(a.size)
+    w = {"phase": np.ones(a.size), "t_start": t, "t_end": t + 10.0, "angle_start": a, "angle_end": a,
+         "mean": A * np.cos(0.25 * math.pi - a) + jump + noise}  # fmt: skip
+    found = heading_of("four", w, latitude)
+    assert any(r.id == "positions.once" for r in found.reasons) == said
+    assert any(r.id == "level.shift" for r in found.reasons) != said
+    assert abs(found["ψ"].estimate - 45.0) > 5.0 * found["ψ"].u
 
 
 def test_a_run_with_rough_on_the_wrong_side_is_warned() -> None:

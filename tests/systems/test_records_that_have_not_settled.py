@@ -85,6 +85,18 @@ def test_a_sense_that_changes_from_dwell_to_dwell(end: int, words: str) -> None:
     assert words in unsettled(dwells("end", 1, end), ("mean",))[0].text  # type: ignore[arg-type]
 
 
+@pytest.mark.filterwarnings("error")
+def test_readings_in_steps_have_no_warning_of_numpy() -> None:
+    """The first readings are alike those between but for one word more or less, which the last ones have, too: the
+    difference of the two is 0 in all dwells.
+    """
+    record = dwells("white", 1)
+    y = np.zeros((40, 5))
+    y[::3, [0, -1]] = 1.0
+    record.windows["mean"] = y.ravel()
+    assert unsettled(record, ["mean"]) == []  # type: ignore[arg-type]
+
+
 def rates(early: float, warming: float) -> str:
     """Three cycles to 100 deg/s in steps of 25; ``early``: share of a reading before the table has its rate; scale
     factor in ppm that ``warming`` is what it changes by from the first reading to the last one.
