@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Iterator
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 from typing import Any
 
@@ -101,3 +101,10 @@ def written_verdicts() -> Iterator[str]:
 def test_one_function_writes_verdicts() -> None:
     """SuiteQuantity has a word of comparison (agree, disagree)."""
     assert set(written_verdicts()) == {"verdict.py:replace", "method_comparison.py:result_suite.SuiteQuantity"}
+
+
+def test_large_numbers_of_sentences_are_written_as_in_tables() -> None:
+    text = "a by 1.7e+02 °/h², 8.3e+04 u, 2e+07 s. 1e+03. x1e+02, 3e-05 and 1.5e+02.csv stay"
+    expected = "a by 170 °/h², 83000 u, 2·10⁷ s. 1000. x1e+02, 3e-05 and 1.5e+02.csv stay"
+    result = conclude(replace(found(Reason("r", text), a=(1.0, 2.0)), conventions=[text], summary=[text]))
+    assert [r.text for r in result.reasons] == result.conventions == result.summary == [expected]

@@ -229,7 +229,7 @@ def test_laboratory_file(session: Session, tmp_path: Path, command: Command) -> 
             load().read_measured(tmp_path / "bad.csv", {})
 
 
-@pytest.mark.parametrize(("factor", "said"), [(1.0, ""), (1e3, "1.03e+03 times the Earth"), (1e-3, "less than that")])
+@pytest.mark.parametrize(("factor", "said"), [(1.0, ""), (1e3, "1030 times the Earth"), (1e-3, "less than that")])
 def test_a_current_in_another_unit(tmp_path: Path, factor: float, said: str) -> None:
     """0.9 mA of 17.2 deg/h/mA are 15.5 deg/h, 1.03 of 15.04 deg/h; in mA of A 1029 times the Earth rate.  A scatter of
     0.0002 mA, 0.0034 deg/h in a minute, is a random walk of 0.0034 sqrt(1/60) = 4.4e-4 deg/sqrt(h), of a thousandth

@@ -17,7 +17,10 @@ from gyrobench.result import Coefficient, Result
 
 ROUNDING = 1e-9  # of an estimate: a smaller U is that of data without noise
 SAID = {"arcsec": "″", "1e-6": "ppm"}  # units as a sentence has them
+SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 ONE_SIDED = 0.1  # of its width: how far the middle of an interval is off its estimate, and it is written by its ends
+POWER = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e\+(\d+)(?!\w|\.\w)")  # of Python's, in "1.7e+02 °/h"
+PLAIN = 6  # digits before the decimal sign that are written without a power of ten, as in tables
 FIELD = re.compile(r"\{(-?)([^{}]+)\}")
 
 
@@ -29,6 +32,16 @@ def p_text(p: float) -> str:
 def seconds(t: float, digits: int = 3) -> str:
     """Return "15.4 s", "13510 s": a time with so many digits, without a power of ten."""
     return f"{t:.{digits}g} s" if t < 1000.0 else f"{float(f'{t:.{digits}g}'):.0f} s"
+
+
+def written_out(text: str) -> str:
+    """Return a sentence with its large numbers as tables write them: 1.7e+02 as 170, 1.7e+07 as 1.7·10⁷."""
+
+    def number(m: re.Match[str]) -> str:
+        power = int(m[2])
+        return f"{float(m[0]):.0f}" if power < PLAIN else f"{m[1]}·10{str(power).translate(SUPERSCRIPT)}"
+
+    return POWER.sub(number, text) if "e+" in text else text
 
 
 def _is_uncertain(c: Coefficient) -> bool:
@@ -95,4 +108,6 @@ def told(coefficients: Sequence[Coefficient], *templates: str) -> list[str]:
 
 def renewed(result: Result) -> list[str]:
     """Return the summary of a result with its present estimates and uncertainties in the sentences."""
-    return [Sentence(s.template, result.coefficients) if isinstance(s, Sentence) else s for s in result.summary]
+    return [
+        Sentence(s.template, result.coefficients) if isinstance(s, Sentence) else written_out(s) for s in result.summary
+    ]

@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.allowance import allowances
-from gyrobench.reduction.estimation.sentences import renewed
+from gyrobench.reduction.estimation.sentences import renewed, written_out
 from gyrobench.reduction.estimation.step_effect import with_step
 from gyrobench.reduction.estimation.truth_check import missed_truth, set_values
 from gyrobench.reduction.setup import conditions
@@ -92,7 +92,9 @@ def conclude(
     found = replace(found, coefficients=judged, reasons=reasons, verdict=verdict, decision_rule=rule)
     if isinstance(found, LoopResult):
         found = replace(found, tables=[*found.tables, *allowances(found.shares, judged)])
-    return replace(found, summary=renewed(found))
+    reasons = [replace(r, text=written_out(r.text)) for r in found.reasons]
+    conventions = [written_out(text) for text in found.conventions]
+    return replace(found, summary=renewed(found), reasons=reasons, conventions=conventions)
 
 
 def _judged(
