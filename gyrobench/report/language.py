@@ -43,7 +43,7 @@ PLACEHOLDER = re.compile(r"\{(\w+)\}")
 NUMERIC, VERBATIM = re.compile(r"n\d*"), re.compile(r"v\d*")
 NUMBER = r"(?:[\d\s.,·:…−+±%<>=≤≥⁻⁰¹²³⁴⁵⁶⁷⁸⁹/-]|e(?=[+-]\d))+(?: UTC)?"
 #: English words: letters that are no symbol and no part of an identifier (table.angle, u_a, --set, x.csv)
-WORD = re.compile(r"(?<![\w./\\@-])(?:[A-Za-z][a-z]{2,}|of|to|no|in|by|at|is|on|or|as|eq|ch)(?![\w\\@]|[./-]\w)")
+WORD = re.compile(r"(?<![\w./\\@-])(?:[A-Za-z][a-z]{2,}|of|to|no|in|by|at|is|on|or|as|up|eq|ch)(?![\w\\@]|[./-]\w)")
 #: three words that follow one another
 PROSE = re.compile(r"(?<![\w./\\@-])[a-z]{2,}(?: [a-z]{2,}){2}(?![\w\\@]|[./-]\w)")
 SENTENCE = re.compile(r"(?<=[.!?])(?<!\bch\.)(?<!\bpar\.)(?<!\beq\.)(?<!\bed\.)\s+(?=[^a-z\s(=]|[a-z]\b|[a-z]+[/(:])")

@@ -122,6 +122,13 @@ def test_warnings_of_rows_and_of_set_up_errors_in_chinese() -> None:
         assert found is not None and not english_words(found, {"set", "latitude", "gyro"}), found or english
 
 
+def test_up_is_a_word() -> None:
+    """A label whose one word it is was taken for a name, and stayed."""
+    words = Language(catalogue("zh", standard_folder() / "systems" / "vibration_rectification"))
+    texts = ["up, 1 g", "down, 1.4 g", "x up, 1 g rms", "up, about north"]
+    assert [words.text(t) for t in texts] == ["朝上，1 g", "朝下，1.4 g", "x 向上，1 g rms", "朝上，绕北向"]
+
+
 def english_words(text: str, allowed: set[str]) -> set[str]:
     """Return the words of a text in PDF that are neither names of the catalogue nor allowed."""
     return set(WORD.findall(OPTION.sub("", text))) - catalogue("zh").names - allowed
