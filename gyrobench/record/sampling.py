@@ -1,26 +1,37 @@
-"""Samples of a current that a fast loop moves: whether noise beyond half the sampling rate may have folded into them.
+"""Samples that are averaged into windows: noise that may have folded into them, words that no noise averages out, a
+converter at the end of its range.
 
-Point samples of such a current are independent of one another: their spectrum is flat to half the sampling rate.  Means
-between two samples, or samples behind a low-pass filter, fall off before it or are of opposite sign in turn.  The ratio
+Point samples of a current that a fast loop moves hold noise from beyond half the sampling rate.  They are independent:
+their spectrum is flat to half that rate.  Means between two samples, or samples behind a low-pass filter, fall off
+before it or are of opposite sign in turn.  The ratio
 
     E (x[k+2] - x[k])^2 / E (x[k+1] - x[k])^2    1: independent;  4: a slope;  2/3: differences of independent readings
 
 hardly depends on a slow change of the signal.  Means of white noise are independent too: what the samples are must be
 stated, this says only that they may be the wrong ones.
+
+Rounding to words q leaves a mean of readings with the noise s off by the sawtooth of its place between two words,
+
+    the rms of which is q sqrt(sum over k of exp(-(2 pi k s/q)^2)/(2 (pi k)^2))
+
+however many readings there are: nothing at q = s, 0.07 s at 3 s, q/sqrt(12) without noise.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from gyrobench import units
 from gyrobench.arrays import Array
+from gyrobench.record.range_ends import RangeEnds
 
 LEAST = 200  # samples, below which nothing is said
+CHANGES = 10  # samples that differ from the one before, below which they have no words
+HARMONICS = 50  # of the sawtooth of rounding
 FLAT = 0.1  # from 1, of the ratio
 
 
@@ -31,9 +42,17 @@ class Successive:
     count: int = 0
     first: float = 0.0  # of squares of differences of neighbours
     second: float = 0.0  # of those one apart
+    word: float = math.inf  # least difference of neighbours that is not 0
+    changes: int = 0  # neighbours that differ
+    ends: RangeEnds = field(default_factory=RangeEnds)
 
     def add(self, x: Array) -> None:
         """Take the samples of a stretch without gaps."""
+        change = np.abs(np.diff(x))
+        if (change := change[change > 0.0]).size:
+            self.word, self.changes = min(self.word, float(np.min(change))), self.changes + change.size
+        if x.size:
+            self.ends.add(x)
         if x.size > 2:
             self.count += x.size - 2
             self.first += float(np.sum(np.diff(x[:-1]) ** 2))
@@ -50,6 +69,19 @@ class Successive:
         if self.count < LEAST or not self.first:
             return False
         return abs(self.second / self.first - 1.0) < max(FLAT, 5.0 / math.sqrt(self.count))
+
+    @property
+    def rounding(self) -> float:
+        """Return the rms error of a mean by rounding that the noise does not average out; 0 where that is less than the
+        standard deviation of the mean of all samples.
+        """
+        if self.count < LEAST or self.changes < CHANGES:
+            return 0.0
+        q, k = self.word, np.arange(1, HARMONICS)
+        noise = math.sqrt(max(self.scatter**2 - q * q / 12.0, 0.0))
+        sawtooth = np.exp(-((2.0 * math.pi * k * noise / q) ** 2)) / (2.0 * (math.pi * k) ** 2)
+        off = q * math.sqrt(float(np.sum(sawtooth)))
+        return off if off > self.scatter / math.sqrt(self.count) else 0.0
 
 
 def stated(comments: Mapping[str, str]) -> tuple[str, float]:
@@ -90,3 +122,22 @@ def warning(signal: str, unit: str, step: float, seen: Successive, kind: str, ba
         f"that of point samples of a faster loop. {size} If they are points, {consequence} {remedy}, or state the "
         "bandwidth of the loop or filter ('# bandwidth = 14Hz'): twice that is enough as a sampling rate."
     )
+
+
+def limits(signal: str, unit: str, seen: Successive) -> str:
+    """Return the warning of samples in words that their noise does not average out, or at the end of a range; "" of
+    others.
+    """
+    shown, factor = units.display(unit), units.factor(unit)
+    if off := seen.rounding:
+        return (
+            f"Samples of {signal} are rounded to {seen.word / factor:.3g} {shown}, more than their noise averages out: "
+            f"means are off by {off / factor:.2g} {shown} rms, alike while the signal is, and no uncertainty holds "
+            "that. Read them in finer words, or with more noise."
+        )
+    if at := seen.ends.limited(seen.count):
+        return (
+            f"{at} samples of {signal} are at the end of its range, where a converter was at its limit: their means "
+            "are wrong, and no uncertainty holds that. Take a larger range."
+        )
+    return ""

@@ -25,6 +25,7 @@ from gyrobench.system.plan import Phase
 if TYPE_CHECKING:
     from gyrobench.system.system import System
 
+SHOWN = {"A": "mA", "rad/s": "deg/h"}  # unit of a column -> in warnings
 FLAG = CsvColumn("flag", "1", "other than 0: the sample is suspect", required=False)
 
 
@@ -89,7 +90,7 @@ def windows_of_series(
     attitudes: Mapping[str, str] | None,
 ) -> tuple[dict[str, AnyArray], dict[str, str], list[str]]:  # fmt: skip
     """Return the windows, the comments ``phase N`` (those found by the motion too), and warnings: what was left out,
-    samples that may be aliased.
+    samples that may be aliased, in coarse words or at the end of a range.
 
     attitudes: what a phase may be called.  Raises DataError.
     """
@@ -126,12 +127,12 @@ def windows_of_series(
     problems = _short(averager, phases) if by_motion else []
     if problems:
         raise DataError(file, problems)
-    units_of = {c.name: c.unit for c in names.columns}
-    aliased = [
-        sampling.warning(s, {"A": "mA"}.get(units_of[s], units_of[s]), averager.step, seen,
-                         kind, bandwidth) for s, seen in averager.successive.items()
-    ]  # fmt: skip
-    return _as_windows(series, names, keys, columns), dict(said), [t for t in (averager.sentence(), *aliased) if t]
+    units_of = {c.name: SHOWN.get(c.unit, c.unit) for c in names.columns}
+    notes = [averager.sentence()]
+    for s, seen in averager.successive.items():
+        notes.append(sampling.warning(s, units_of[s], averager.step, seen, kind, bandwidth))
+        notes.append(sampling.limits(s, units_of[s], seen))
+    return _as_windows(series, names, keys, columns), dict(said), [t for t in notes if t]
 
 
 def _as_windows(

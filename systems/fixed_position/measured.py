@@ -52,7 +52,10 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     needed, columns = {"latitude": "45.75deg", "k": "17.2deg/h/mA", "attitude": "E U -N"}, COLUMNS
     if {**read_head(data).comments, **values}.get("reading", "") == "rate":
         del needed["k"]
-        columns = tuple(c if c.unit != "A" else replace(c, unit="rad/s") for c in COLUMNS)
+        columns = tuple(
+            c if c.unit != "A" else replace(c, unit="rad/s", meaning=c.meaning.replace("torquer current", "rate"))
+            for c in COLUMNS
+        )
     record = read_record(system, data, values, needed=needed, columns=columns, time=None)
     windows = dict(record.windows)
     day = windows.pop("day", np.ones(len(windows["mean"]), dtype=np.int64))
