@@ -124,20 +124,22 @@ def warning(signal: str, unit: str, step: float, seen: Successive, kind: str, ba
     )
 
 
-def limits(signal: str, unit: str, seen: Successive) -> str:
-    """Return the warning of samples in words that their noise does not average out, or at the end of a range; "" of
-    others.
-    """
-    shown, factor = units.display(unit), units.factor(unit)
-    if off := seen.rounding:
-        return (
-            f"Samples of {signal} are rounded to {seen.word / factor:.3g} {shown}, more than their noise averages out: "
-            f"means are off by {off / factor:.2g} {shown} rms, alike while the signal is, and no uncertainty holds "
-            "that. Read them in finer words, or with more noise."
-        )
-    if at := seen.ends.limited(seen.count):
-        return (
-            f"{at} samples of {signal} are at the end of its range, where a converter was at its limit: their means "
-            "are wrong, and no uncertainty holds that. Take a larger range."
-        )
-    return ""
+def coarse(signal: str, unit: str, seen: Successive) -> str:
+    """Return the warning of samples in words that their noise does not average out; "" of others."""
+    if not (off := seen.rounding):
+        return ""
+    word, rms = (f"{x / units.factor(unit):.{n}g} {units.display(unit)}" for x, n in ((seen.word, 3), (off, 2)))
+    return (
+        f"Samples of {signal} are rounded to {word}, more than their noise averages out: means are off by {rms} rms, "
+        "alike while the signal is, and no uncertainty holds that. Read them in finer words, or with more noise."
+    )
+
+
+def ended(signal: str, seen: Successive) -> str:
+    """Return the warning of samples at the end of a range; "" where there are none, or words make the values few."""
+    if seen.rounding or not (at := seen.ends.limited(seen.count)):
+        return ""
+    return (
+        f"{at} samples of {signal} are at the end of its range, where a converter was at its limit: their means are "
+        "wrong, and no uncertainty holds that. Take a larger range."
+    )

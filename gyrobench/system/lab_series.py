@@ -131,7 +131,7 @@ def windows_of_series(
     notes = [averager.sentence()]
     for s, seen in averager.successive.items():
         notes.append(sampling.warning(s, units_of[s], averager.step, seen, kind, bandwidth))
-        notes.append(sampling.limits(s, units_of[s], seen))
+        notes += [sampling.coarse(s, units_of[s], seen), sampling.ended(s, seen)]
     return _as_windows(series, names, keys, columns), dict(said), [t for t in notes if t]
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import AnyArray, Array
+from gyrobench.record import sampling
 from gyrobench.record.circumstances import Keys, faults
 from gyrobench.record.csv_reader import CsvColumn, DataError, Head
 from gyrobench.record.drift_columns import named, open_table
@@ -31,6 +32,7 @@ UP_DOWN = "up_down"  # option attitudes
 
 COUNTS = re.compile(r" *\[(?:counts?|lsb|digits)\]", re.I)
 NUMBER = CsvColumn("position", "1", "number of the position, 0: moved", required=False)
+SHOWN = {"rad/s": "deg/h", "m/s2": "mg"}  # unit of a channel -> in warnings
 FEW = 20  # samples of a position, or of a piece of it
 MOVED = 6.0  # times the usual scatter
 PIECES = 20  # of a position up or down
@@ -69,6 +71,7 @@ def read_log(system: System, data: Path, values: Mapping[str, str]) -> Record:
     run.window_units = {f"mean_{c.name}": si[c.name] for c in CHANNELS} | {"t_start": "s", "t_end": "s"}
     channels = {"time": time, **{f"imu.rate[{k + 1}]": every[:, k] for k in range(3)}}
     run.units = {n: si["gx"] for n in channels if n != "time"}
+    run.notes = _coarse(time, every, windows, si)
     return Record(windows, channels, run)
 
 
@@ -141,6 +144,18 @@ def _windows(
     for a, b in found:
         rest[a:b] = True
     return out, _moved(out) + _clipped(time, every, rest)
+
+
+def _coarse(time: Array, every: Array, windows: Mapping[str, AnyArray], si: Mapping[str, str]) -> list[str]:
+    """Return the channels whose words are larger than their noise at rest averages out."""
+    cuts = [np.searchsorted(time, windows[n]).tolist() for n in ("t_start", "t_end")]
+    notes = []
+    for k, c in enumerate(CHANNELS):
+        seen = sampling.Successive()
+        for a, b in zip(*cuts, strict=True):
+            seen.add(every[a:b, k])
+        notes.append(sampling.coarse(c.name, SHOWN.get(si[c.name], "1"), seen))
+    return [text for text in notes if text]
 
 
 def _clipped(time: Array, every: Array, rest: NDArray[np.bool_]) -> list[str]:

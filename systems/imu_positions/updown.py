@@ -14,6 +14,9 @@ An input axis that leans towards a level one by m reads m t of a case that leans
 bias.  Half of the difference and half of the sum of what a level accelerometer reads, as angles, are these two or bias;
 their product, even from 0, is in u of ba.
 
+A bias that changes when the axis is turned over is half in hg and Sa and in no residual of one turn (turned.once); one
+that fades from then on is a drift to the noise: verdicts must hold with it (turned.fades).
+
 Not modelled: misalignments of the gyros; squares of the specific force, which two directions do not tell from a bias.
 """
 
@@ -28,6 +31,7 @@ import numpy as np
 
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.estimation.unshown_columns import fading, intervals_with
 from gyrobench.reduction.setup import sources
 from gyrobench.reduction.setup.sources import Source
 from gyrobench.reduction.setup.window_checks import window_problems
@@ -45,12 +49,18 @@ from gyrobench.reduction.toolkit import (
     RunDocument,
     Table,
 )
+from gyrobench.result import Reason
 from gyrobench.units import DPH
 
 from .budget import ImuSetup
 from .channels import AXES, CHANNELS, UG, ImuInstrument, overview
 from .hand_positions import COLUMNS
 
+ONCE = Reason(
+    "turned.once",
+    "The axis was turned over once: a bias that changes then (it is touched, heated, switched) is in the biases, in hg "
+    "and in Sa, and in no residual. Take the first position once more at the end.",
+)
 UPRIGHT = 0.9  # of gravity along the axis that stands up or down
 TILT = Source(
     "axis.vertical", "axis off the vertical", "rad", "u_mount", "of each position, towards the level Earth rate"
@@ -122,6 +132,21 @@ class UpDownChannel(DriftReduction[ImuSetup]):
             return [TILT.effect(s, each)]
         largest = float(np.max(self._lean))
         return [LEAN_RATE.effect(largest / math.sqrt(2.0), each * self._lean / largest)]  # towards any heading
+
+    def completed(self, result: DriftTestResult) -> DriftTestResult:
+        """Add what the coefficients may be with a bias that fades after the axis was turned over."""
+        rows = self.sign != 0.0
+        sign, t0, t1 = (
+            np.asarray(v, dtype=float)[rows] for v in (self.sign, *map(self.windows.get, ("t_start", "t_end")))
+        )
+        data = self.regression()
+        intervals = intervals_with(data.X, data.y, fading(sign, t0, t1), result.coefficients)
+        text = (
+            "What fades after the axis was turned over, as heat that another attitude moves, is not told from a drift "
+            f"of the {self.channel.words}. Wait longer before the first reading of a position."
+        )
+        faded = Reason("turned.fades", text, ("pass", "fail"), severity="condition", intervals=intervals)
+        return replace(result, reasons=[*result.reasons, *([faded] if intervals else [])])
 
     @property
     def _level(self) -> Array:
@@ -200,6 +225,11 @@ class UpDownReduction(ChannelTests[ImuSetup]):
                 f"accelerometers: at rest they read {size:.4g} m/s², gravity is {s.gravity:.4g}: the unit is mistaken"
             ]
         return []
+
+    def reasons(self) -> list[Reason]:
+        """Return that an axis was turned over once."""
+        turned = [np.count_nonzero(np.diff(s[s != 0.0])) for s in self.signs[:, list(self.axes)].T]
+        return [ONCE] if 1 in turned else []
 
     def overview(self, results: Mapping[str, DriftTestResult]) -> list[str]:
         return overview([c for r in results.values() for c in r.coefficients])

@@ -29,7 +29,7 @@ from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.level_shift import jumped
 from gyrobench.reduction.estimation.nuisances import BOTH
-from gyrobench.reduction.estimation.unshown_columns import intervals_with
+from gyrobench.reduction.estimation.unshown_columns import fading, intervals_with
 from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all, doubts_at_rest, unanswered, word_error
 from gyrobench.reduction.setup.sources import GRAVITY, GYRO_WORD, LATITUDE
 from gyrobench.reduction.toolkit import (
@@ -59,7 +59,6 @@ GYRO, FORCE = "gyro", "accelerometer"
 COLUMN = {GYRO: "rate", FORCE: "force"}
 LEAST = 3  # levels, rest included
 FADING = 1.0 / 3.0  # of a level that is not reached: from a reading to the next one
-FADES = (2.5, 10.0)  # time constants in a position, of what fades after it was taken
 UG = 1e-6 * G0
 SHOWN = 0.01  # probability of a fourth power by chance, below which the report says what it changes
 ONCE = Reason(
@@ -223,17 +222,12 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
         return [Reason(id, text, BOTH, severity=severity, intervals=intervals)] if intervals else []
 
     def _faded(self, result: DriftTestResult) -> list[Reason]:
-        turns = np.concatenate([[0], np.flatnonzero(np.diff(self.up)) + 1])
-        place = np.searchsorted(turns, np.arange(self.up.size), side="right") - 1
         t0, t1 = (np.asarray(self.windows[n], dtype=float) for n in ("t_start", "t_end"))
-        whole = np.append(t1[turns[1:] - 1], t1[-1]) - t0[turns]
-        since = ((t0 + t1) / 2.0 - t0[turns][place]) / whole[place]
-        fades = np.where(place > 0, self.up, 0.0)[:, None] * np.exp(-since[:, None] * np.array(FADES))
         text = (
             "What fades after the axis was turned over, as heat that another attitude moves, is not told from a drift "
             f"of the {self.channel}. Wait longer before the first reading of a position."
         )
-        return self._with(result, "turned.fades", text, np.column_stack([fades, t0 - t0.mean()]))
+        return self._with(result, "turned.fades", text, fading(self.up, t0, t1))
 
     def late(self) -> Array:
         """Return the step of the mean square that a reading would still hold some of, a third of the one before it."""

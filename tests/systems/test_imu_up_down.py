@@ -110,3 +110,35 @@ def test_a_misalignment_times_a_lean_is_in_u_of_the_bias(tmp_path: Path) -> None
         bias = next(c for c in updown.UpDownReduction.of_record(record(path)).coefficients if c.name == "ba_z")
         true = 9.805 / 9.80665e-6 * math.sin(m) * math.sin(t)
         assert bias.estimate == pytest.approx(true, abs=2.0) and bias.u == pytest.approx(u, rel=0.02, abs=0.5)
+
+
+def reduced(path: Path, series: Any) -> Any:
+    system = load_system("imu_positions")
+    assert system.measured_data is not None
+    reduction: Any = importlib.import_module(".reduction", room)
+    return reduction.Reduction.from_record(system.measured_data.read(system, write(path, *series), {}))
+
+
+def test_a_bias_that_fades_after_the_turn_asks_a_verdict_to_hold_with_it(tmp_path: Path) -> None:
+    """2e-6 rad/s (two noises of a sample) that fade with 20 s of the 60: hg is off by half of their mean, 2e-6 (20/60)
+    (1 - exp(-3))/2 = 3.2e-7 rad/s, to half of their size, 1e-6, as noise that walks weighs the ends of both positions.
+    Of one turn the report says that a jump then is in no residual.
+    """
+    unit = Unit.drawn(np.random.default_rng(11))
+    time, gyro, acc = up_down(np.random.default_rng(12), unit)
+    fading = 2e-6 * np.where(time >= time[1200], np.exp(-(time - time[1200]) / 20.0), 0.0)
+    result = reduced(tmp_path / "log.csv", (time, gyro + fading[:, None], acc))
+    hg, true = next(c for c in result.coefficients if c.name == "hg_z"), gyro[:1200, 2].mean() - gyro[1200:, 2].mean()
+    assert -1.05e-6 < hg.estimate * DPH - true / 2.0 < -3e-7
+    assert true / 2.0 / DPH > hg.interval[1]
+    low, high = next(r for r in result.reasons if r.id == "turned.fades" and "hg_z" in r.intervals).intervals["hg_z"]
+    assert low < true / 2.0 / DPH < high and high - low < 8.0 * (hg.interval[1] - hg.interval[0])
+    assert any(r.id == "turned.once" for r in result.reasons)
+
+
+def test_words_that_the_noise_does_not_average_out_are_said(tmp_path: Path) -> None:
+    """Words of three noises of the gyros: means up to 3/pi exp(-2 pi2/9) = 0.11 of the noise off."""
+    time, gyro, acc = up_down(np.random.default_rng(12), Unit.drawn(np.random.default_rng(11)))
+    for word, said in ((1e-6, 0), (3e-6, 3)):
+        run = record(write(tmp_path / f"{said}.csv", time, word * np.rint(gyro / word), acc)).run
+        assert sum("more than their noise averages out" in note for note in run.notes) == len(run.notes) == said

@@ -14,6 +14,20 @@ from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.result import Coefficient
 
+FADES = (2.5, 10.0)  # time constants in a position, of what fades after it was taken
+
+
+def fading(up: Array, t0: Array, t1: Array) -> Array:
+    """Return the columns (n, 3) of what fades after an axis was turned over, as heat that another attitude moves does,
+    and of a trend; up (n,): sense of the axis in each reading.
+    """
+    turns = np.concatenate([[0], np.flatnonzero(np.diff(up)) + 1])
+    place = np.searchsorted(turns, np.arange(up.size), side="right") - 1
+    whole = np.append(t1[turns[1:] - 1], t1[-1]) - t0[turns]
+    since = ((t0 + t1) / 2.0 - t0[turns][place]) / whole[place]
+    fades = np.where(place > 0, up, 0.0)[:, None] * np.exp(-since[:, None] * np.array(FADES))
+    return np.column_stack([fades, t0 - t0.mean()])
+
 
 def intervals_with(X: Array, y: Array, more: Array, found: Sequence[Coefficient]) -> dict[str, tuple[float, float]]:
     """Return the hull of each coefficient's interval and that with the columns ``more`` (n, k), printed units.
