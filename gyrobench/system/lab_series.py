@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from gyrobench.system.system import System
 
 SHOWN = {"A": "mA", "rad/s": "deg/h"}  # unit of a column -> in warnings
+NO_PHASE = (
+    "the phases of this test are not recognised by the motion of the table: add a column 'phase' (their number in each "
+    "row, 0 while moving or settling)"
+)
 FLAG = CsvColumn("flag", "1", "other than 0: the sample is suspect", required=False)
 
 
@@ -103,6 +107,8 @@ def windows_of_series(
     by_motion = "phase" in names.keys and not keys
     try:
         kind, bandwidth = sampling.stated(said)
+        if by_motion and not names.angles:
+            raise ValueError(NO_PHASE)
         if by_motion:
             phases = _expected(phases, said, attitudes or {})
             step, stretches = _recognise(file, head, asked, names, phases)
@@ -129,7 +135,9 @@ def windows_of_series(
         raise DataError(file, problems)
     units_of = {c.name: SHOWN.get(c.unit, c.unit) for c in names.columns}
     notes = [averager.sentence()]
-    for s, seen in averager.successive.items():
+    readings = [name for column, name in names.signals.items() if "mean" in column]
+    for s in readings:
+        seen = averager.successive[s]
         notes.append(sampling.warning(s, units_of[s], averager.step, seen, kind, bandwidth))
         notes += [sampling.coarse(s, units_of[s], seen), sampling.ended(s, seen)]
     return _as_windows(series, names, keys, columns), dict(said), [t for t in notes if t]
@@ -146,7 +154,7 @@ def _as_windows(
             if not there.any():
                 continue
             made[column] = np.interp(series["t_end"], series["t_end"][there], series[name][there])  # logged less often
-        if f"std {name}" in series:
+        if f"std {name}" in series and "mean" in column:  # of readings alone
             made[column.replace("mean", "std")] = series[f"std {name}"]
     for n in ("n", *(c.name for c in columns if c.name.startswith("flagged"))):
         made[n] = series[n.partition("_")[0]].astype(np.int64)
@@ -169,10 +177,7 @@ def _expected(plan: Sequence[Phase], said: Mapping[str, str], attitudes: Mapping
             raise ValueError(f"phase {', '.join(unknown)} is not in the plan; it has {', '.join(of)}")
         plan = [of[said[f"phase {n}"]] for n in numbers]
     if not plan or any(p.mode in ("servo", "step") or p.target_y for p in plan):
-        raise ValueError(
-            "the phases of this test are not recognised by the motion of the table: add a column 'phase' (their number "
-            "in each row, 0 while moving or settling) and comments '# phase 1 = ...'"
-        )
+        raise ValueError(f"{NO_PHASE} and comments '# phase 1 = ...'")
     return list(plan)
 
 

@@ -25,6 +25,7 @@ COLUMNS = (
     *READING_TIMES,
     CsvColumn("rate", "rad/s", "rate of the table"),
     CsvColumn("mean", "rad/s", "mean indicated rate"),
+    CsvColumn("phase", "1", "number of the step, of time series", required=False, whole=True),
     CsvColumn("cycle", "1", "cycle, from 1", required=False, whole=True),
     CsvColumn("std", "rad/s", "standard deviation of the samples", required=False),
     FLAGGED,

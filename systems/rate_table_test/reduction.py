@@ -259,6 +259,16 @@ class Reduction(DriftReduction[RateTableSetup]):
             random="random drift and noise of the readings",
         )  # fmt: skip
 
+    def _once(self, h: Coefficient) -> list[Reason]:
+        """Return that a hysteresis of rates that are read once may be a gyro that had not settled."""
+        if np.any(np.diff(levels(self.table)) == 0) or h.interval[0] <= 0.0 <= h.interval[1]:
+            return []
+        text = (
+            "Each rate is read once: a gyro that had not settled, or a reading begun before the table had its rate, "
+            "is in h, and no residual shows it. Read each rate twice or more."
+        )
+        return [Reason("rate.once", text, names=("h",))]
+
     def _tail(self, e: Coefficient) -> list[Reason]:
         """Return that what a band d takes off all rates, d2/(2 w2) of the smallest, is more than U of e."""
         low, high = self.small.bounds or (0.0, math.inf)
@@ -293,7 +303,7 @@ class Reduction(DriftReduction[RateTableSetup]):
         added = self.small.coefficient(truth)
         e, _, _, _, b = result.coefficients[:5]
         reasons = [*handling.implausible(*result.coefficients[:2]), *worded(self.setup.parameters, b.u * DPH)]
-        reasons += self._tail(e)
+        reasons += [*self._tail(e), *self._once(result.coefficients[3])]
         return replace(
             result,
             coefficients=[*result.coefficients, *([added] if added else [])],

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from gyrobench.engine.session import Session
+from gyrobench.record.csv_reader import DataError
 from gyrobench.report.diagnostics_section import validity
 from gyrobench.report.page_model import Text
 from gyrobench.report.result_json import Report
@@ -140,3 +143,41 @@ def test_the_rank_is_that_of_the_estimates_of_the_fit() -> None:
     assert len(result.coefficients) == 6
     texts = [b.text for s in validity(Report.of(result)) for b in s.blocks if isinstance(b, Text)]
     assert any(t.startswith("The design matrix has rank 5 for 5 reported estimates") for t in texts)
+
+
+def series(late: float, phase: bool, window: float, folder: Path) -> Path:
+    """Two cycles of 0, +-20, +-40 deg/s for 10 s at 10 Hz, a second between; a gyro with 0.2 % that is ``late``, s."""
+    sweep = [0.0, *[20.0, 40.0, 20.0, 0.0, -20.0, -40.0, -20.0, 0.0] * 2]
+    rate = np.concatenate([np.append(np.full(100, w), np.linspace(w, x, 12)[1:-1]) for w, x in pairwise([*sweep, 0.0])])
+    number = np.concatenate([np.append(np.full(100, k + 1), np.zeros(10)) for k in range(len(sweep))])
+    t = 0.1 * np.arange(rate.size)
+    mean = 1.002 * np.interp(t - late, t, rate) + 0.01 * np.random.default_rng(1).normal(size=t.size)
+    names = ["time [s]", *["phase"] * phase, "rate [deg/s]", "mean [deg/s]"]
+    rows = [",".join(f"{v:.9g}" for v in row) for row in zip(t, *[number] * phase, rate, mean, strict=True)]
+    head = ["# latitude = 0deg", "# type_b = none", "# samples = means", f"# window = {window}s", ",".join(names)]
+    file = folder / "series.csv"
+    file.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+    return file
+
+
+def test_time_series_are_averaged_by_their_phases(tmp_path: Path) -> None:
+    """The rates are those of the steps (they were their standard deviations, and transitions were averaged, too)."""
+    system = load_system(NAME)
+    record = system.read_measured(series(0.0, True, 3.0, tmp_path), {})
+    assert np.unique(np.round(record.windows["rate"] / DEG, 6)).tolist() == [-40.0, -20.0, 0.0, 20.0, 40.0]
+    e = system.reduce(record)["e"]
+    assert e.estimate == pytest.approx(2000.0, abs=4.0 * e.u) and e.u < 30.0  # 0.01/sqrt(30) deg/s of 27 rms, 51 times
+    with pytest.raises(DataError, match="add a column 'phase'"):
+        system.read_measured(series(0.0, False, 3.0, tmp_path), {})
+
+
+@pytest.mark.parametrize(("window", "said"), [(9.0, "rate.once"), (3.0, "record.unsettled")])
+def test_a_late_gyro_that_is_read_once_a_rate_has_a_word(tmp_path: Path, window: float, said: str) -> None:
+    """1.5 s late, a second of them in the ramp: the first 0.5 s of a rate hold 10 deg/s less on average, h is 0.5 deg/s
+    and no residual shows it of one reading; of three the first is not as the others.
+    """
+    system = load_system(NAME)
+    result = system.reduce(system.read_measured(series(1.5, True, window, tmp_path), {}))
+    assert {r.id for r in result.reasons} & {"rate.once", "record.unsettled"} == {said}
+    clean = system.reduce(system.read_measured(series(0.0, True, window, tmp_path), {}))
+    assert not {r.id for r in clean.reasons} & {"rate.once", "record.unsettled"}

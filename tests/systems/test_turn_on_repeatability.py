@@ -311,6 +311,15 @@ def test_a_laboratorys_file(command: Command, tmp_path: Path) -> None:
 
 
 @pytest.mark.long
+def test_time_series_keep_their_time_since_the_turn_on(tmp_path: Path) -> None:
+    """A sample a second, windows of 10: since is 5, 15 ... at their middle (it was its standard deviation, 3)."""
+    rows_ = [f"{2000 * k + t},{k},1,{t},{5.0 + 2.0 * math.exp(-t / 60.0):.6f}" for k in (1, 2) for t in range(41)]
+    head = "# limit = 1deg/h\n# window = 10s\ntime [s],turn_on,day,since [s],mean [deg/h]\n"
+    (tmp_path / "series.csv").write_text(head + "\n".join(rows_) + "\n", encoding="utf-8")
+    windows = load_system(NAME).read_measured(tmp_path / "series.csv", {}).windows
+    assert windows["since"].tolist() == pytest.approx([5.0, 15.0, 25.0, 35.0] * 2)
+
+
 def test_a_late_stamp_of_the_turn_on_is_asked_for(command: Command, tmp_path: Path) -> None:
     """A reading of 10 s late, A is exp(10/60) = 1.18 times as large, and the residuals are the same."""
     late = [[*row[:4], row[4] + 10.0, *row[5:]] for row in rows(on=0.01)]
