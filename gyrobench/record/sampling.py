@@ -136,8 +136,10 @@ def coarse(signal: str, unit: str, seen: Successive) -> str:
 
 
 def ended(signal: str, seen: Successive) -> str:
-    """Return the warning of samples at the end of a range; "" where there are none, or words make the values few."""
-    if seen.rounding or not (at := seen.ends.limited(seen.count)):
+    """Return the warning of samples at the end of a range; "" where there are none, or words or the lack of noise make
+    the values few.
+    """
+    if seen.rounding or 2 * seen.changes < seen.count or not (at := seen.ends.limited(seen.count)):
         return ""
     return (
         f"{at} samples of {signal} are at the end of its range, where a converter was at its limit: their means are "

@@ -38,9 +38,10 @@ from gyrobench.system.system import MeasuredData, System
 from gyrobench.system.values import InvalidValueError
 
 SERIES = """\
-Time series may stand here instead of windows: columns `time [s]`, `current` for `mean` (`current_x` for `mean_x`,
-#   `voltage` of a pickoff), one `angle` for its two, and `flag`; `phase` is 0 while moving or settling.  Without the
-#   column `phase` phases are found in the motion of the table and must fit the plan.  '# window = 60s': their length.
+Time series may stand here instead of windows: columns `time [s]`, `current` for `mean` of a current (`current_x` for
+#   `mean_x`), `voltage` of a voltage, else `mean` itself, one `angle` for its two, and `flag`; `phase` numbers the
+#   phases, 0 while moving or settling.  Without it they are found in the motion of the table, where there is an angle,
+#   and must fit the plan.  '# window = 60s': their length.
 #   Samples that may be aliased are warned of: say what they are by '# samples = means' (each since the one before) or
 #   points, and how far the signal reaches by '# bandwidth = 14Hz'."""
 TEXTS = ("title", "source", "made", "note", "instrument", "operator", *ABOUT, "date", "report", "type_b", "arrangement")

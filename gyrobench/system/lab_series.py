@@ -77,8 +77,7 @@ class _Names:
                 keys.append(c.name)
                 columns.append(CsvColumn(c.name, c.unit, c.meaning, required=c.required and c.name != "phase"))
                 continue
-            kind = {"A": "current", "V": "voltage"}.get(c.unit, c.name)
-            name = c.name.replace("mean", kind)
+            name = c.name.replace("mean", {"A": "current", "V": "voltage"}.get(c.unit, "mean"))
             (signals if c.required else optional)[c.name] = name
             columns.append(CsvColumn(name, c.unit, c.meaning.removeprefix("mean "), c.required))
         return cls(signals, optional, angles, keys, [*columns, FLAG])

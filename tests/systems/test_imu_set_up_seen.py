@@ -92,3 +92,33 @@ def test_what_a_log_by_hand_does_not_show_is_asked_for_and_no_more(tmp_path: Pat
     for said in ("the accelerometers reversed", *wrong, "the latitude of the other sign (G_"):
         assert said in text
     assert "exchanged" not in text and "the gyros reversed" not in text and "rotation" not in text
+
+
+def test_time_series_of_a_table(tmp_path: Path) -> None:
+    """Eleven samples of each window of 15 s, at rest and of a turn of 24 deg/s; ``phase`` numbers positions and turns.
+    The columns are those of the windows, ``mean_gx`` (it was asked for as mean_gx_gx).
+    """
+    rng, unit = np.random.default_rng(4), Unit.drawn(np.random.default_rng(3))
+    w = World().windows(plan(rate=2.0 * math.pi / 15.0), unit)
+    part, names = np.arange(11) / 10.0, [f"mean_{k}{a}" for k in "ga" for a in "xyz"]
+    kept = slice(None, -1)  # the end of a window is the beginning of the next one, but for the last of a phase
+    rows: list[Any] = []
+    for k in range(w["phase"].size):
+        ends = k + 1 == w["phase"].size or w["phase"][k + 1] != w["phase"][k]
+        at = part if ends else part[kept]
+        moving = [w[f"{n}_start"][k] + at * (w[f"{n}_end"][k] - w[f"{n}_start"][k]) for n in ("t", "outer", "inner")]
+        noise = [s * rng.normal(size=(3, at.size)) for s in (1e-7, 1e-5)]
+        read = np.array([w[n][k] for n in names])[:, None] + np.vstack(noise)
+        rows.append(np.vstack([np.full(at.size, w["phase"][k]), *moving, read]))
+    columns = ["phase", "time [s]", "outer [rad]", "inner [rad]", *[f"{n} [rad/s]" for n in names[:3]]]
+    columns += [f"{n} [m/s2]" for n in names[3:]]
+    head = "# window = 15s\n# samples = means\n"
+    file = written(tmp_path / "series.csv", head, dict(zip(columns, np.hstack(rows), strict=True)))
+    c = {x.name: x for x in gb.reduce("imu_positions", file).result.coefficients}
+    tables: Any = importlib.import_module(".tables", room)
+    truth = {n: v for n, v in unit.coefficients().items() if n in c}
+    assert len(truth) == 33
+    assert all(
+        abs(c[n].estimate * tables.SCALES[c[n].unit] - v) < 5.0 * c[n].u * tables.SCALES[c[n].unit]
+        for n, v in truth.items()
+    )
