@@ -63,7 +63,8 @@ def test_a_heading_rests_on_senses(tmp_path: Path, method: str, mistakes: tuple[
     asked = said(reduced(tmp_path, "north_finder", north(method)))["arrangement.unstated"]
     for words in mistakes:
         assert words in asked
-    assert not said(reduced(tmp_path, "north_finder", CHECKED + north(method)))
+    once = {"positions.once"} if method == "four" else set()  # a jump of the bias between its positions
+    assert set(said(reduced(tmp_path, "north_finder", CHECKED + north(method)))) == once
 
 
 # ------------------------------------------------------------------------------------------------ cones, sculling
