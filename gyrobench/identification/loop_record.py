@@ -103,13 +103,9 @@ def _of_own_layout(file: Path, text: Path) -> list[Advice]:
         ):
             keys = {"encoding": found.encoding, "delimiter": found.delimiter, "decimal": found.decimal}
             lines = [] if is_log(file) else [f"{key} = {json.dumps(value)}" for key, value in keys.items()]
-            lines += [
-                f"skip = {found.skip}",
-                f"below = {found.below}",
-                "[columns.time]",
-                'from = "ITS NAME"',
-                'unit = "s"',
-            ]
+            head = f"below = {found.below}" if found.names else "names = false"
+            source = '"ITS NAME"' if found.names else "ITS NUMBER"
+            lines += [f"skip = {found.skip}", head, "[columns.time]", f"from = {source}", 'unit = "s"']
             begins = "\n  ".join([*lines, "and so on for excitation, input (or controller) and output"])
             return [
                 Advice("columns", f"the file has a layout of its own; --columns MAP reads it, a file of:\n  {begins}")

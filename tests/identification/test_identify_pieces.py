@@ -105,6 +105,7 @@ def test_periods_are_found() -> None:
     [
         (["gimbal 1;;;", "", "time [s];excitation [A];input [A];output [V]", "0;0.1;0.2;0.3"], ["skip = 2", "';'"]),
         (["Zeit,Anregung,Eingang,Ausgang", "0,0.1,0.2,0.3"], ["skip = 0", "','"]),
+        (["0,0.1,0.2,0.3"], ["names = false", "from = ITS NUMBER"]),
         (["time [s],excitation [A]", "0,0.1"], []),  # what is missing is in no other layout
     ],
 )
