@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -39,3 +40,23 @@ def test_random_walk_of_a_real_unit_is_that_of_its_sheet(tmp_path: Path, file: s
     density = find_instrument(sheet).density
     assert density is not None
     assert n.estimate == pytest.approx(folded * density / PER_ROOT_HOUR, rel=0.5)
+
+
+def test_bias_of_a_real_unit_over_temperature(tmp_path: Path) -> None:
+    """MPU6050, ten minutes over 0.5 K: its bias goes with the temperature by no more than its maker's 20 °/s over 125 K.
+
+    0.16 °/s/K = 576 °/h/K; the slope of a fit of the means over ten seconds is within the interval, too.
+    """
+    source = DATA / "mpu6050_static.parquet"
+    if not source.is_file():
+        pytest.skip("no folder ../shared/data with real records beside the checkout")
+    read = pq.read_table(source, columns=["gyro_x", "temperature"])
+    columns = {"gyro_x [deg/s]": read["gyro_x"], "temperature [degC]": read["temperature"]}
+    pq.write_table(pa.table(columns), tmp_path / "x.parquet")
+    system = load_system("drift_record")
+    result = system.reduce(system.read_measured(tmp_path / "x.parquet", {"sampling": "99.3Hz"}))
+    (table,) = result.as_dict()["columns"][0]["tables"]["regression"]
+    name, slope, _, low, high, unit, *_ = table["rows"][0]
+    assert (name, unit) == ("temperature", "°/h per K") and -576.0 < low < slope < high < 576.0
+    means = [read[n].to_numpy()[:65000].reshape(-1, 1000).mean(axis=1) for n in ("temperature", "gyro_x")]
+    assert low < 3600.0 * np.polyfit(*means, 1)[0] < high
