@@ -43,7 +43,7 @@ def test_random_walk_of_a_real_unit_is_that_of_its_sheet(tmp_path: Path, file: s
 
 
 def test_bias_of_a_real_unit_over_temperature(tmp_path: Path) -> None:
-    """MPU6050, ten minutes over 0.5 K: its bias goes with the temperature by no more than its maker's 20 °/s over 125 K.
+    """MPU6050, ten minutes over 0.5 K: its bias follows it by no more than its maker's 20 °/s over 125 K.
 
     0.16 °/s/K = 576 °/h/K; the slope of a fit of the means over ten seconds is within the interval, too.
     """
