@@ -79,10 +79,11 @@ class ColumnProposal:
     def text(self) -> tuple[str, list[str]]:
         """Return the text of the map, and what it lacks."""
         text, problems = map_text(self.file, self.test, self.layout, self.found, self.wanted, self.stated, self.table)
-        if "sampling" in self.stated:
-            problems.append('no column of times: write [columns.time], or sampling = "100Hz" below [set]')
         for name in (n for n in self.wanted if n not in self.found and n.split("_")[0] not in OPTIONAL):
             if name == "t_end" and "t_start" in self.found:
+                continue
+            if name == "time" and "sampling" in self.stated:
+                problems.append('no column of times: write [columns.time], or sampling = "100Hz" below [set]')
                 continue
             unused = ", ".join(f"'{c.name}'" for c in self.layout.columns if c not in self.found.values()) or "none"
             source = '"ITS NAME"' if self.layout.names else "ITS NUMBER"
@@ -187,7 +188,7 @@ def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[st
         wanted.append(("rate", "deg/s"))
         if len(rest := [c for c in layout.columns if c not in found.values()]) == 1:
             found["rate"] = rest[0]
-    return found, wanted
+    return found, wanted if "time" in found else [("time", "s"), *wanted]
 
 
 def map_text(
