@@ -60,7 +60,8 @@ class GyroResponse:
         """
         order = np.argsort(f)
         f, value, u = f[order], value[order], u[order]
-        gain, phase = np.vstack([np.log(np.abs(value)), _continuous(f, np.angle(value))]) + hold(f, held)
+        angle = np.asarray(np.angle(value), dtype=float)
+        gain, phase = np.vstack([np.log(np.abs(value)), _continuous(f, angle)]) + hold(f, held)
         return cls(f, gain, phase, u, held, known)
 
     def moved(self, change: Complex) -> GyroResponse:

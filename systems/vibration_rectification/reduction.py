@@ -212,7 +212,8 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
         """Return the column (n, 1) of what acts with the level against gravity: its square of a gyro, its fourth power
         of an accelerometer, whose square is the cubic's.  Readings clipped at the ends of a range make it.
         """
-        return (self.up * (self.s2 if self.channel == GYRO else self.s2**2))[:, None]
+        odd: Array = self.up * (self.s2 if self.channel == GYRO else self.s2**2)
+        return odd[:, None]
 
     def _with(self, result: DriftTestResult, id: str, text: str, more: Array) -> list[Reason]:
         """Return that a verdict must hold with the columns too; a warning where their F test shows them."""
