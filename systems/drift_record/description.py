@@ -236,6 +236,7 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
              "step": noise_tables.steps_text(noise, p.time, p.units),
              "settling": noise_tables.settling_text(noise, p.units),
              "swings": noise_tables.swings_text(noise, p.units), "curve": noise_tables.curve_text(noise),
+             "taken_off": taken_off_text(p),
              "level": noise_tables.levels_text(noise), "changes": noise_tables.over_time_text(noise),
              "rows": rows_text(p, run)}  # fmt: skip
     for id, text in found.items():
@@ -265,6 +266,11 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
             f"{excess.decibels:.2g} dB too large. Sample every {excess.longest:.2g} s or faster, or take means.",
         )
     return out
+
+
+def taken_off_text(p: Prepared) -> str:
+    """Return that slow drift is taken off before the record; "" where it is not, or columns of the file explain it."""
+    return "" if any(r.kept for r in p.regressions) else noise_tables.taken_off_text(p.noise)
 
 
 def in_short(p: Prepared, run: RunDocument) -> str:

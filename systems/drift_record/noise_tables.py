@@ -19,6 +19,7 @@ from gyrobench.result import Table
 EVEN, SWING = 1e-6, 0.1  # probability and size of a change of the noise level from which on it is said
 CHANGED = {"white": "white noise behind its filter", "readout": "white noise of the reading",
            "gauss_markov": "σ of the Gauss-Markov drift"}  # fmt: skip
+WEAK = 1e-4  # probability of so little of the slowest noise below which it is said
 STEEP = 0.03  # probability of a fall of the slow drift below which it is said
 FEW_CYCLES, SLOWEST = 50.0, 1e-3  # of a line; part of the record from which on the tau of a process is slow
 SHOWN = 6  # wild samples or steps that are listed
@@ -270,6 +271,18 @@ def curve_text(noise: NoiseModel) -> str:
     return (
         f"The slow drift may be a curve that is no noise: {why}. K, R and slow processes are those of this curve, and "
         "another record need not have them. Repeat the record, with the temperature beside the rate."
+    )
+
+
+def taken_off_text(noise: NoiseModel) -> str:
+    """Return that slow drift is taken off before the record; "" where it is not, or was taken out of the record."""
+    t = noise.treatment
+    taken_out = t.settling or t.swings or t.steps or any(x.frequency * t.samples < FEW_CYCLES for x in t.lines)
+    if taken_out or noise.chances["weak"] > WEAK:
+        return ""
+    return (
+        "The slowest noise is less than the rest of the record makes (p < 0.0001): slow drift is taken off, by a "
+        "filter or by the instrument, which corrects its bias as it runs. B, K, R and B_min are those of what is left."
     )
 
 

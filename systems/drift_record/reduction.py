@@ -109,6 +109,9 @@ def _reasons(a: Analysed, run: RunDocument, several: bool) -> list[Reason]:
     against = [(id, text, names) for id, text in description.doubts(a.of, run).items()]
     if curve := noise_tables.curve_text(a.noise):
         against.append(("drift_record.curve", curve, tuple(_named(term, a, several) for term in ("K", "R"))))
+    if taken_off := description.taken_off_text(a.of):
+        of = tuple(_named(term, a, several) for term in ("B", "K", "R", LEAST_DEVIATION))
+        against.append(("drift_record.taken_off", taken_off, of))
     return description.warnings(a.of, run) + [
         Reason(id, text, ("pass", "fail"), of, severity="doubt") for id, text, of in against
     ]

@@ -65,10 +65,7 @@ def values_of(model: NoiseModel, of: ChannelUnits, published: str) -> dict[str, 
         "stated": "yes" if model.agrees else "no",
         "N": "–" if not model.agrees else white if N.determined else f"below {high} {unit}",
         "N, published": published or "–",
-        "remarks": ", ".join(
-            [f"{n} {word}" for n, word in counts if n] + [*["settles"] * bool(t.settling), *["swings"] * bool(t.swings)]
-        )
-        or "–",
+        "remarks": ", ".join(remarks) or "–",
         "changes over the quarters": ", ".join(changes) or "–",
     }
 

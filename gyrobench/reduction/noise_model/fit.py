@@ -29,7 +29,7 @@ from gyrobench.reduction.noise_model.choice import Judge, deviations_of, filter_
 from gyrobench.reduction.noise_model.gap_completion import completed_by
 from gyrobench.reduction.noise_model.maximum import Fitted, maximize
 from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseModel, Process, Scale, scale_of, times
-from gyrobench.reduction.noise_model.one_curve import steep_fall
+from gyrobench.reduction.noise_model.one_curve import steep_fall, weak_start
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
 from gyrobench.reduction.noise_model.search import GM, ModelSearch, search, search_again
@@ -112,7 +112,7 @@ def fit_noise(
         agreements=(whole.scaled(scale.size, tau0), clean.scaled(scale.size, tau0)),
         with_wild={n: v * scale.units[n] for n, v in _with_wild(treated, at, found, means).items()},
         models=len(found.seen),
-        chances={"filtered": filter_probability(clouds), "steep": steep_fall(found, at)},
+        chances={"filtered": filter_probability(clouds), "steep": steep_fall(found, at), "weak": weak_start(found, at)},
     )
 
 
