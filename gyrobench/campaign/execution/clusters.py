@@ -92,6 +92,8 @@ def local_cluster(workers: int) -> Iterator[Client]:
             # in place of dask's
             loaded = ["distributed", "gyrobench.campaign.execution.worker", "scipy.stats", "scipy.signal"]
             get_mp_context().set_forkserver_preload(loaded)
+        # what is on its way when the cluster has closed, and with it its silence, would be a traceback on the terminal
+        logging.getLogger("distributed.batched").setLevel(logging.CRITICAL)
         with _stop_of_this_process():
             made = LocalCluster(
                 n_workers=workers,
