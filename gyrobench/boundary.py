@@ -121,6 +121,6 @@ def faults_of(error: ValidationError, model_at: Callable[[tuple[int | str, ...]]
             found.append(f"{place}: unknown key; {suggest_names(str(fault['loc'][-1]), known)}")
             continue
         given = "" if fault["type"] == "missing" else f" = {shorten(repr(fault['input']))}"
-        said = fault["msg"].removeprefix("Value error, ")
+        said = str(fault["ctx"]["error"]) if fault["type"] == "value_error" else fault["msg"]
         found.append(f"{place}{given}: {said[:1].lower()}{said[1:]}")
     return found

@@ -15,7 +15,6 @@ Units tell the first from the others; an excitation with the unit of both must b
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from contextlib import suppress
@@ -101,11 +100,8 @@ def _of_own_layout(file: Path, text: Path) -> list[Advice]:
             or found.encoding != "utf-8"
             or read_head(text).line != found.skip + 1
         ):
-            keys = {"encoding": found.encoding, "delimiter": found.delimiter, "decimal": found.decimal}
-            lines = [] if is_log(file) else [f"{key} = {json.dumps(value)}" for key, value in keys.items()]
-            head = f"below = {found.below}" if found.names else "names = false"
             source = '"ITS NAME"' if found.names else "ITS NUMBER"
-            lines += [f"skip = {found.skip}", head, "[columns.time]", f"from = {source}", 'unit = "s"']
+            lines = [*found.keys(not is_log(file)), "[columns.time]", f"from = {source}", 'unit = "s"']
             begins = "\n  ".join([*lines, "and so on for excitation, input (or controller) and output"])
             return [
                 Advice("columns", f"the file has a layout of its own; --columns MAP reads it, a file of:\n  {begins}")

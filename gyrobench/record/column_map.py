@@ -340,8 +340,7 @@ class MappedRows:
     def problems(self, of_reader: Sequence[str] = ()) -> list[str]:
         """Return what was wrong, each with its rows, before what the reader of the lines found."""
         own = [f"{row_list(rows)}: '{text[:60]}': {what}" for what, (text, rows) in self.faults.items()]
-        counted = not self.map.names and any(re.search(r"\brows? \d", p) for p in of_reader)
-        return [*own, *of_reader, *([ONE_MORE] if counted else [])]
+        return [*own, *of_reader, *([ONE_MORE] if of_reader and not self.map.names else [])]
 
     def notes(self) -> list[str]:
         """Return what was left out, for the report."""

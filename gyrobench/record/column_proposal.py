@@ -8,6 +8,7 @@ German) and dimensions; what a name does not tell (signs, factors, which of two 
 from __future__ import annotations
 
 import codecs
+import json
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -52,8 +53,8 @@ ENDINGS = {
 }  # fmt: skip
 #: what messages of ROS and PX4 call a quantity -> unit of their definition
 MESSAGES = {r"(.*\.)?angular_velocity[._].*|gyro_rad": "rad/s", r"(.*\.)?linear_acceleration[._].*": "m/s2"}
-#: since 1970, from 2001 to 2100 -> unit that such a number is in
-EPOCH = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+EPOCH = (1e9, 4.1e9)  # s since 1970: 2001 and 2100
+NO_NAMES = "names = false  # no row of names: columns by their numbers"
 ENDING = re.compile(rf"(.*?[^_ .])[_ .]({'|'.join(sorted(ENDINGS, key=len, reverse=True))})")
 #: units whose sign means something else elsewhere (mg is milligauss, too) -> names that they count beside
 SAID = {"degC": r".*temp.*", **dict.fromkeys(("g", "mg"), r"(.*acc|.*beschl|[af]_?[xyz]).*")}
@@ -109,6 +110,15 @@ class FileLayout:
     rows: int
     columns: tuple[FileColumn, ...]
     names: bool = True  # it has a row of names
+
+    def keys(self, text: bool = True) -> list[str]:
+        """Return the lines of a column map that state the layout; text: of a text file, no log."""
+        written = {"encoding": self.encoding, "delimiter": self.delimiter, "decimal": self.decimal}
+        return [
+            *(f"{key} = {json.dumps(value)}" for key, value in written.items() if text),
+            f"skip = {self.skip}  # lines above the {'names of the columns' if self.names else 'rows'}",
+            f"below = {self.below}  # lines between names and rows" if self.names else NO_NAMES,
+        ]
 
 
 def find_encoding(data: bytes) -> str:
@@ -272,8 +282,11 @@ def _columns(
 def _epoch(cells: Sequence[str]) -> str:
     """Return the unit of times since 1970, "" of other numbers."""
     with suppress(ValueError, IndexError):
-        first, last = float(cells[0]), float(cells[-1])
-        return next((u for u, f in EPOCH.items() if 1e9 * f <= first <= last < 4.1e9 * f), "")
+        ends = float(cells[0]), float(cells[-1])
+        for unit in ("s", "ms", "us", "ns"):
+            first, last = (units.convert(end, unit, "s") for end in ends)
+            if EPOCH[0] <= first <= last < EPOCH[1]:
+                return unit
     return ""
 
 

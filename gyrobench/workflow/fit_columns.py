@@ -32,7 +32,6 @@ from gyrobench.workflow.inputs import load_test
 
 OPTIONAL = ("std", "n", "flagged")
 COUNTS = "counts"  # of columns that are called as the angle or velocity of each sample
-NO_NAMES = "names = false  # no row of names: columns by their numbers"
 KINDS = ("rad/s", "rad", "m/s2", "K")  # of the columns of a drift record, which has any names
 #: what columns without a unit are called -> unit that may be meant
 OTHER = r"(?!.*(time|stamp|_dt\b|count|clip|_id\b|status))"  # what belongs to a rate or force and is none
@@ -202,9 +201,8 @@ def map_text(
     lines = [
         f"# Column map of {file.name}: gyrobench reduce {test.name} --data {shlex.quote(file.name)} --columns MAP",
         "# Check columns, units and signs (factor = -1 reverses one): names do not tell them all.",
-        *([f"table = {_quoted(table)}"] if table else [] if is_log(file) else _text_keys(layout)),
-        f"skip = {layout.skip}  # lines above the {'names of the columns' if layout.names else 'rows'}",
-        *([f"below = {layout.below}  # lines between names and rows"] if layout.names else [NO_NAMES]),
+        *([f"table = {_quoted(table)}"] if table else []),
+        *layout.keys(not is_log(file)),
         "# no value: missing (refused; a gap in time series), skip (leaves the row out), previous (as above)",
         f"empty = {_quoted('skip' if empty and not series else 'missing')}  # {empty} in the columns below",
     ]
@@ -230,11 +228,6 @@ def map_text(
         f"{'' if n == COUNTS else '# '}{n} = {_quoted(v)}" for n, v in stated.items() if not n.startswith("phase ")
     ]
     return "\n".join(lines) + "\n", problems
-
-
-def _text_keys(layout: FileLayout) -> list[str]:
-    keys = {"encoding": layout.encoding, "delimiter": layout.delimiter, "decimal": layout.decimal}
-    return [f"{key} = {_quoted(value)}" for key, value in keys.items()]
 
 
 def _entry(name: str, c: FileColumn, unit: str, problems: list[str]) -> list[str]:

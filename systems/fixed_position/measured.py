@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +41,11 @@ COLUMNS: tuple[CsvColumn, ...] = (
     CsvColumn("std", "A", "standard deviation of the samples", required=False),
     FLAGGED,
 )
+#: those that are others of a rate gyro
+RATES = {
+    "mean": CsvColumn("mean", "rad/s", "mean rate"),
+    "std": CsvColumn("std", "rad/s", "standard deviation of the samples", required=False),
+}
 
 
 def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
@@ -52,10 +56,7 @@ def read(system: System, data: Path, values: Mapping[str, str]) -> Record:
     needed, columns = {"latitude": "45.75deg", "k": "17.2deg/h/mA", "attitude": "E U -N"}, COLUMNS
     if {**read_head(data).comments, **values}.get("reading", "") == "rate":
         del needed["k"]
-        columns = tuple(
-            c if c.unit != "A" else replace(c, unit="rad/s", meaning=c.meaning.replace("torquer current", "rate"))
-            for c in COLUMNS
-        )
+        columns = tuple(RATES.get(c.name, c) for c in COLUMNS)
     record = read_record(system, data, values, needed=needed, columns=columns, time=None)
     windows = dict(record.windows)
     day = windows.pop("day", np.ones(len(windows["mean"]), dtype=np.int64))

@@ -271,7 +271,7 @@ def _not_shown(
 
 def _largest(moved: dict[str, float]) -> str:
     first = sorted(moved, key=lambda n: -moved[n])[:LARGEST]
-    return ", ".join(f"{name} by {float(format(moved[name], '.2g')):g} u" for name in first)
+    return ", ".join(f"{name} by {moved[name]:.2g} u" for name in first)
 
 
 def _moved_plainly(result: DriftTestResult, reference: _Plain | None, plain: _Plain | None) -> dict[str, float] | None:

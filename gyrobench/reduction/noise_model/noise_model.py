@@ -94,8 +94,8 @@ class NoiseModel:
     coefficients: N [unit sqrt(s)], B [unit], K [unit/sqrt(s)], R [unit/s, signed], Q [unit s].  shape: terms and their
     parameters in units of ``scale``, as the treatment is.  agreements: with the record as it was, and without what was
     taken out.  with_wild: coefficients with the wild samples left in.  models: how many were compared.
-    chances: filtered, that the white noise has passed a filter; steep, of so steep a fall of the slow drift by chance,
-    see :mod:`gyrobench.reduction.noise_model.one_curve`.
+    chances: filtered, that the white noise has passed a filter; steep, of so steep a fall of the slow drift, weak, of
+    so little of the slowest noise by chance, see :mod:`gyrobench.reduction.noise_model.one_curve`.
     """
 
     scale: Scale
