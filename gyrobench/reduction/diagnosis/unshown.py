@@ -50,6 +50,7 @@ from gyrobench.reduction.diagnosis.handling_errors import (
 from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup.conditions import READINGS, readings
 from gyrobench.result import DriftTestResult, Reason
 from gyrobench.units import DEG
@@ -271,7 +272,7 @@ def _not_shown(
 
 def _largest(moved: dict[str, float]) -> str:
     first = sorted(moved, key=lambda n: -moved[n])[:LARGEST]
-    return ", ".join(f"{name} by {moved[name]:.2g} u" for name in first)
+    return ", ".join(f"{name} by {plain(moved[name])} u" for name in first)
 
 
 def _moved_plainly(result: DriftTestResult, reference: _Plain | None, plain: _Plain | None) -> dict[str, float] | None:

@@ -29,9 +29,15 @@ def p_text(p: float) -> str:
     return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
 
 
+def plain(x: float, digits: int = 2) -> str:
+    """Return "1.7", "190": a number with so many digits, a large one without a power of ten."""
+    text = f"{x:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text else text
+
+
 def seconds(t: float, digits: int = 3) -> str:
-    """Return "15.4 s", "13510 s": a time with so many digits, without a power of ten."""
-    return f"{t:.{digits}g} s" if t < 1000.0 else f"{float(f'{t:.{digits}g}'):.0f} s"
+    """Return "15.4 s", "13510 s"."""
+    return f"{plain(t, digits)} s"
 
 
 def written_out(text: str) -> str:
