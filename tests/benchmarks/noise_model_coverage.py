@@ -134,6 +134,8 @@ def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str
             for term in "NBKRQ":
                 e, true = model[term], truth.get(term, 0.0)
                 inside[term].append(e.low <= true <= e.high)
+                if e.determined:
+                    inside[f"{term} stated"].append(inside[term][-1])
                 if not inside[term][-1]:
                     missed.append(f"{term} {i} ({n} {' '.join(these)}: {e.low:.4g} to {e.high:.4g})")
                 stated[term].append(e.determined)
