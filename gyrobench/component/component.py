@@ -46,6 +46,7 @@ from gyrobench.component.composition import (
     view_of,
 )
 from gyrobench.component.declarations import (
+    DRAWN,
     Declaration,
     Noise,
     Parameter,
@@ -58,12 +59,11 @@ from gyrobench.component.declarations import (
 )
 from gyrobench.component.integration import advance
 from gyrobench.component.math import value
-from gyrobench.component.numerics import ROUNDING, normal
+from gyrobench.component.numerics import ROUNDING, OnUse, normal
 from gyrobench.component.tangents import Tangent, dig, tangents
 from gyrobench.component.tuned import check_bounds, tune
 from gyrobench.component.vectors import Vector, copied, is_finite
 
-PER = ("start", "step", "second")  # when noise is drawn
 RESERVED = ("der", "noise", "instance")
 
 
@@ -94,6 +94,7 @@ class Component:
     layout: ClassVar[list[Scalar]] = []
     states: ClassVar[list[Scalar]] = []
     noises: ClassVar[list[Noise]] = []
+    _sampled_noises: ClassVar[list[Noise]] = []  # those whose samples are kept over an internal step
 
     t = 0.0
     h = 0.0
@@ -127,9 +128,11 @@ class Component:
         cls.layout = make_layout(declared)
         cls.states = [s for s in cls.layout if s.section == "state"]
         cls.noises = [d for d in declared.values() if isinstance(d, Noise)]
+        cls._sampled_noises = [n for n in cls.noises if n.per != "use"]
         cls._by_name = {s.name: s for s in cls.layout}
         cls.streams = [0, *accumulate(math.prod(n.sample_shape) for n in cls.noises)][:-1]
-        cls._ports = {per: [p for p in zip(cls.streams, cls.noises, strict=True) if p[1].per == per] for per in PER}
+        ports = list(zip(cls.streams, cls.noises, strict=True))
+        cls._ports = {per: [p for p in ports if p[1].per == per] for per in DRAWN}
         cls._inputs = Watched(s for s in cls.layout if s.section == "input")
         cls._watched = Watched(
             s for s in cls.layout if s.section in ("state", "output", "discrete") and not s.is_memory
@@ -251,7 +254,10 @@ class Component:
     def reset(self) -> None:
         """Return to the state before initialization, every value at its start."""
         self.der = Derivatives()
-        self.noise = SimpleNamespace(**{n.name: floats(full(0.0, n.sample_shape)) for n in self.noises})
+        self.noise = SimpleNamespace(
+            **{n.name: floats(full(0.0, n.sample_shape)) for n in self._sampled_noises},
+            **{n.name: OnUse(self, s, n.name) for s, n in self._ports["use"]},
+        )
         for d in self.declarations.values():
             setattr(self, d.name, floats(d.start))
             if isinstance(d, State):
@@ -269,7 +275,7 @@ class Component:
         return {
             "part": f"{type(self).__name__} {self.version}",
             "v": [self._at(s) for s in self.layout],
-            "noise": [copied(getattr(self.noise, n.name)) for n in self.noises],
+            "noise": [copied(getattr(self.noise, n.name)) for n in self._sampled_noises],
             **{n: getattr(self, n) for n in TIMES},
             "tick": self._tick,
             "running": self._running,
@@ -284,7 +290,7 @@ class Component:
             raise ComponentError(f"{self.instance}: a state of {state['part']} is not one of this part")
         for s, x in zip(self.layout, state["v"], strict=True):
             self._put(s, x)
-        for n, x in zip(self.noises, state["noise"], strict=True):
+        for n, x in zip(self._sampled_noises, state["noise"], strict=True):
             setattr(self.noise, n.name, floats(x))
         for time in TIMES:
             setattr(self, time, state[time])

@@ -103,18 +103,24 @@ class Output(Declaration):
         super().__init__(full(0.0, shape), unit, doc)
 
 
+DRAWN = ("start", "step", "second", "use")  # when noise is drawn
+
+
 class Noise(Parameter):
     """A noise port; its size is a parameter of the same name, its sample is ``self.noise.<name>``.
 
     ``per="second"``: white, the size is the two-sided density (unit/sqrt(Hz)); a sample is
     ``size * xi / sqrt(h)``, so the mean over a time T has variance ``size**2 / T`` whatever the step.
     ``per="step"``: ``size * xi``, one for each internal step.  ``per="start"``: drawn once.
+    ``per="use"``: as ``step``, but made only where ``start`` or a sampled method reads it: a step needs few of many.
     A port of size 0 draws nothing.  ``samples=n``: the sample is a vector of n independent numbers of that size.
     """
 
     def __init__(self, start: float, unit: str, doc: str = "", *, per: str = "second", samples: int = 0) -> None:
-        if per not in ("second", "step", "start"):
-            raise ValueError(f'Noise(per="{per}"): one of "second", "step", "start"')
+        if per not in DRAWN:
+            raise ValueError(f'Noise(per="{per}"): one of "start", "step", "second", "use"')
+        if per == "use" and not samples:
+            raise ValueError('Noise(per="use"): of samples=n numbers, of which each is made where it is read')
         super().__init__(start, unit, doc, min=0.0)
         self.per = per
         self.sample_shape: Shape = (samples,) if samples else ()

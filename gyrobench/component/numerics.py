@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import Any
 
 from gyrobench.component.elementary import log
 
@@ -94,6 +96,19 @@ def normal(seed: int, port: int, count: int) -> float:
     key = _mix((_mix((seed + 1) * GAMMA & MASK) + (port + 1) * GAMMA) & MASK)
     z = _mix((key + count * GAMMA) & MASK)
     return quantile(((z >> 11) + 0.5) * 2.0**-53)
+
+
+@dataclass(frozen=True)
+class OnUse:
+    """The samples of a noise port of a part (its size, its seed, its internal step), each made where it is read."""
+
+    part: Any
+    stream: int
+    size: str
+
+    def __getitem__(self, k: int) -> float:
+        size = float(getattr(self.part, self.size))
+        return size * normal(int(self.part.seed), self.stream + k, self.part._tick) if size != 0.0 else 0.0
 
 
 def quantile(p: float) -> float:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from gyrobench.component.composition import Derivatives, stored
 from gyrobench.component.declarations import State
 from gyrobench.component.math import Dual, lift
+from gyrobench.component.numerics import OnUse
 from gyrobench.component.vectors import Vector, copied
 
 if TYPE_CHECKING:
@@ -51,7 +53,9 @@ def twin_of(part: Component, of: Callable[[Any], Any] = copied) -> Component:
         values[key] = of(values[key])
         if isinstance(d, State):
             setattr(twin.der, name, of(getattr(part.der, name)))
-    twin.noise = SimpleNamespace(**{k: of(v) for k, v in vars(part.noise).items()})
+    twin.noise = SimpleNamespace(
+        **{k: replace(v, part=twin) if isinstance(v, OnUse) else of(v) for k, v in vars(part.noise).items()}
+    )
     return twin
 
 

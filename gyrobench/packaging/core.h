@@ -27,6 +27,8 @@ typedef struct { /* what follows from the numbers, kept because it seldom change
     int n, keyed; /* keyed: what follows belongs to the values */
     int n_drawn; /* the streams that are drawn in steps; of each: where its sample stands, whether it is a density */
     struct { int sample, density; double size; uint64_t key; } drawn[N_STREAMS + 1];
+    int used_first; /* the numbers of a step that were made last for ports of which each is made where it is read */
+    double used_tick, used_p[LANES], used[LANES];
     uint64_t first;
     double ahead[AHEAD * (N_STREAMS + 1)]; /* size times normal number of the counts first, first + 1, ...: rows of n_drawn */
     double seen[N_FOLLOWED > 0 ? N_FOLLOWED : 1]; /* what the outputs were last made from, while `settled` */
@@ -84,6 +86,7 @@ static COLD void prepare_noise(Part *p) {
     p->kept.keyed = 1;
     p->kept.n_drawn = 0;
     p->kept.first = (uint64_t)1 << 63; /* none made: far from every count */
+    p->kept.used_tick = -1.0;
 #if N_PORTS > 0
     const double *a = value(p);
     int i, j;
@@ -124,7 +127,22 @@ static COLD void draw_start(Part *p) { /* what is drawn once, and the first samp
         }
 #endif
     p->kept.keyed = 0;
+    p->kept.used_tick = -1.0;
 }
+
+#if N_STREAMS > 0
+/* Sample k of a port of which each is made where it is read; some of one step are read side by side. */
+static inline double on_use(Part *p, double size, int stream, int k) {
+    const int first = stream + k / LANES * LANES, i = k % LANES;
+    if (size == 0.0) return 0.0;
+    if (p->kept.used_first != first || p->kept.used_tick != p->n.v.tick) {
+        side_by_side((uint64_t)p->n.v.seed, first, (uint64_t)(int64_t)p->n.v.tick, p->kept.used_p, p->kept.used);
+        p->kept.used_first = first;
+        p->kept.used_tick = p->n.v.tick;
+    }
+    return size * (fabs(p->kept.used_p[i] - 0.5) <= 0.425 ? p->kept.used[i] : quantile_rare(p->kept.used_p[i]));
+}
+#endif
 
 static inline void draw(Part *p) { /* the samples of an internal step */
 #if N_PORTS > 0
@@ -142,6 +160,8 @@ static inline void draw(Part *p) { /* the samples of an internal step */
     (void)p;
     (void)prepare_noise;
     (void)make_noise;
+    (void)side_by_side;
+    (void)quantile_rare;
 #endif
 }
 

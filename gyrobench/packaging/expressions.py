@@ -74,6 +74,8 @@ class Expressions(Places):
         d = self.dual
         if p.kind == "constant":
             return self.number(f"d_con({p.base})" if d else p.base, plain=True)
+        if p.kind == "drawn":
+            return CExpression(p.shape, lambda *i: p.at(*i).replace("[", "").replace("]", ")"))
         if p.kind == "loop":
             return self.number(f"d_con({p.base})" if d else f"(double){p.base}", plain=True)
         p = self.settled(p)

@@ -106,6 +106,7 @@ def c_source(cls: type[Component], guid: str) -> str:
     ports = [
         f"{{{param[n.name]}, {samples + stream}, {PER[n.per]}, {stream}, {math.prod(n.sample_shape)}}}"
         for stream, n in zip(cls.streams, cls.noises, strict=True)
+        if n.per != "use"
     ]
     defines = {
         "MODEL_GUID": f'"{guid}"',

@@ -88,13 +88,35 @@ static inline void quantiles(const double p[AHEAD], double out[AHEAD]) {
         out[rare[i]] = copysign(root[i] <= 5.0 ? tail[i] : quantile_end(root[i]), p[rare[i]] - 0.5);
 }
 
+static inline double uniform(uint64_t key, uint64_t count) {
+    return ((double)(int64_t)(mix(key + count * GAMMA) >> 11) + 0.5) * 0x1p-53;
+}
+
 /* The normal numbers of count, count + 1, ... */
 BY_PROCESSOR static void normals(uint64_t key, uint64_t count, double out[AHEAD]) {
     double p[AHEAD];
     int i;
-    for (i = 0; i < AHEAD; i++) {
-        const uint64_t z = mix(key + (count + (uint64_t)i) * GAMMA);
-        p[i] = ((double)(int64_t)(z >> 11) + 0.5) * 0x1p-53;
-    }
+    for (i = 0; i < AHEAD; i++) p[i] = uniform(key, count + (uint64_t)i);
     quantiles(p, out);
+}
+
+/* Of one count the numbers p of neighbouring streams, and their normal quantiles where those are of the middle. */
+BY_PROCESSOR static void side_by_side(uint64_t seed, int stream, uint64_t count, double p[LANES], double out[LANES]) {
+    lanes q;
+    int i;
+    for (i = 0; i < LANES; i++) p[i] = uniform(key_of(seed, stream + i), count);
+    memcpy(&q, p, sizeof q);
+    q -= 0.5;
+    quantile_middle(&q);
+    memcpy(out, &q, sizeof q);
+}
+
+static NEVER_INLINE double quantile_rare(double p) {
+    const double above = 1.0 - p, root = sqrt(-logarithm(p < above ? p : above));
+    lanes x = {0.0};
+    double tail[LANES];
+    x += root;
+    quantile_tail(&x);
+    memcpy(tail, &x, sizeof x);
+    return copysign(root <= 5.0 ? tail[0] : quantile_end(root), p - 0.5);
 }

@@ -130,6 +130,12 @@ class Places(ABC):
             raise self.refuse(e, f"self.{e.attr} is not declared in {owner.__name__}")
         if source == "self.der" and isinstance(d, State):
             return CVariable(f"der.{member(name)}", "self", f"der.{name}", d.shape)
+        if source == "self.noise" and isinstance(d, Noise) and d.per == "use":
+            if self.dual:
+                raise self.refuse(e, f"{ast.unparse(e)} is made where it is read: in start and sampled methods only")
+            cls = self.translation.source.cls
+            draw = f"on_use(part, self->{member(name)}, {cls.streams[cls.noises.index(d)]}, "
+            return CVariable(draw, "drawn", f"noise.{name}", d.sample_shape)
         if source == "self.noise" and isinstance(d, Noise):
             return CVariable(f"noise.{member(name)}", "self", f"noise.{name}", d.sample_shape)
         if source.startswith("self.") and (place := self.of_block(e, source)) is not None:

@@ -16,6 +16,7 @@ from toybench import TOYS
 
 from gyrobench.component.numerics import normal
 from gyrobench.packaging import compiler, load_part, native_target
+from gyrobench.packaging.source import SubsetError
 
 N = 20000
 
@@ -187,5 +188,14 @@ def test_a_port_of_several_samples(instance: Callable) -> None:
 
 
 def test_cannot_be_declared_wrong(written: Callable) -> None:
-    with pytest.raises(ValueError, match='one of "second", "step", "start"'):
+    with pytest.raises(ValueError, match='one of "start", "step", "second", "use"'):
         written("toy", '    n = Noise(1.0, "V", per="hour")\n')
+    with pytest.raises(ValueError, match="of samples=n numbers"):
+        written("toy2", '    n = Noise(1.0, "V", per="use")\n')
+
+
+def test_made_where_read_is_for_methods_that_run_once_a_step(written: Callable) -> None:
+    declared = '    y = Output("V", "y")\n    n = Noise(1.0, "V", per="use", samples=2)\n\n'
+    cls = written("toy", declared + "    def outputs(self) -> None:\n        self.y = self.noise.n[1]\n")
+    with pytest.raises(SubsetError, match="made where it is read: in start and sampled methods"):
+        native_target.c_source(cls, "guid")

@@ -25,7 +25,7 @@ B, K, Q, TAU, TAU_Q = 0.3, 0.2, 0.7, 1e5, 0.02
 NAMES = ["a", "b", "c"]
 #: variance and correlation time of each relaxation for B = 1
 VARIANCES = np.array([OUTER**2, *[INNER**2] * (RELAXATIONS - 2), OUTER**2])
-TAUS = RATIO ** -np.arange(float(RELAXATIONS))
+TAUS = RATIO ** -np.arange(float(RELAXATIONS))[::-1]
 
 
 def play(one: Any, h: float, n: int, **parameters: float) -> Array:
@@ -73,13 +73,22 @@ def allan(x: Array, m: int) -> float:
 
 
 def test_bank_is_flicker_noise() -> None:
-    """B2 / (2 pi f) within 1 % from 0.46 / tau to 0.055 / tau_11; Allan variance 2 ln 2 B2 / pi within 1.5 %."""
-    f = np.logspace(math.log10(0.46), math.log10(0.055 / TAUS[-1]), 400)
+    """B2 / (2 pi f) within 1 % from 0.46 / tau to 0.055 / tau_0; Allan variance 2 ln 2 B2 / pi within 1.5 %.
+
+    A process that is exact at the multiples of h = tau_j / 16, a = exp(-1/16), and held between has the PSD
+    h sinc2(f h) (1 - a2) / |1 - a exp(2 pi i f h)|2, sinc(x) = sin(pi x) / (pi x): none at f = 1/h.
+    """
+    f = np.logspace(math.log10(0.46), math.log10(0.055 / TAUS[0]), 4000)
     s = np.sum(2.0 * VARIANCES * TAUS / (1.0 + (2.0 * math.pi * f[:, None] * TAUS) ** 2), axis=1)
     assert np.max(np.abs(2.0 * math.pi * f * s - 1.0)) < 0.01
-    assert RATIO == 4.0  # the fourth power in the block
+    f = np.union1d(f, 16.0 / TAUS[5:])
+    h, a = TAUS / 16.0, math.exp(-1.0 / 16.0)
+    beside = np.abs(1.0 - a * np.exp(2j * math.pi * f[:, None] * h)) ** 2
+    held = np.sum(VARIANCES * h * np.sinc(f[:, None] * h) ** 2 * (1.0 - a * a) / beside, axis=1)
+    off = np.abs(2.0 * math.pi * f * held - 1.0)
+    assert np.max(off) < 0.0135 and np.mean(off > 0.01) < 0.02
     assert VARIANCES.sum() == pytest.approx(5.59, abs=0.005)
-    t = np.logspace(math.log10(30.0 * TAUS[-1]), math.log10(0.03), 50)[:, None]  # s, of a Gauss-Markov process:
+    t = np.logspace(math.log10(30.0 * TAUS[0]), math.log10(0.03), 50)[:, None]  # s, of a Gauss-Markov process:
     gm = (
         2.0
         * VARIANCES
@@ -144,7 +153,7 @@ def test_quantization(h: float, series: Callable[[float], Array]) -> None:
 
 
 def test_every_relaxation(instance: Callable[..., Any]) -> None:
-    """The recursion, from the numbers of the streams themselves: ports 0 (streams 0..11), 1 (12), 2 (13)."""
+    """Each is exact at the multiples of a sixteenth of its correlation time; of streams 0 to 11, then 12 and 13."""
     h, n, seed = 3.0, 5, 9
     sizes = {"flicker": B, "walk": K, "quantization": Q, "quantization_tau": TAU_Q, "seed": seed}
     got = {t: play(instance("drifting", t, toy=True), h, n, **sizes) for t in ("plain", "native", "python")}
@@ -154,7 +163,8 @@ def test_every_relaxation(instance: Callable[..., Any]) -> None:
     error, walk = Q * xi[0, -1], 0.0
     rows = [(np.sqrt(VARIANCES) @ x, 0.0, 0.0)]
     for k in range(1, n + 1):
-        a = np.exp(-h / (TAU * TAUS))
+        held = np.floor(k * h / (TAU * TAUS / 16.0)) - np.floor((k - 1) * h / (TAU * TAUS / 16.0))
+        a = np.exp(-held / 16.0)
         x = a * x + np.sqrt(1.0 - a**2) * B * xi[k, :RELAXATIONS]
         walk += K * math.sqrt(h) * xi[k, -2]
         r = math.exp(-h / TAU_Q)
