@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from gyrobench.component import Discrete, Noise, Output, Parameter, sampled
 from gyrobench.component.blocks.rate_gyro import AngleCounter, RateGyro, locked
-from gyrobench.component.math import exp, fabs, log, maximum, pi, sign, sin, sqrt
+from gyrobench.component.math import cos, exp, fabs, log, maximum, pi, sign, sin, sqrt
 
 DEG = pi / 180.0
 
@@ -75,7 +75,8 @@ class GyroLaser(RateGyro):
         shaken = 0.0
         if self.stripped < 0.5 and self.dither > 0.0:
             w_d = 2.0 * pi * self.dither_f
-            shaken = self.dither * (sin(w_d * self.t) - sin(w_d * (self.t - self.h))) / (w_d * self.h)
+            half = 0.5 * w_d * self.h
+            shaken = self.dither * cos(w_d * self.t - half) * sin(half) / half  # mean of the dither over the step
         for j in range(2):
             w = turned[j] + drift[j] + self.langmuir * self.current_difference
             if self.dither > 0.0:

@@ -59,7 +59,7 @@ from gyrobench.component.declarations import (
 )
 from gyrobench.component.integration import advance
 from gyrobench.component.math import value
-from gyrobench.component.numerics import ROUNDING, OnUse, normal
+from gyrobench.component.numerics import ROUNDING, OnUse
 from gyrobench.component.tangents import Tangent, dig, tangents
 from gyrobench.component.tuned import check_bounds, tune
 from gyrobench.component.vectors import Vector, copied, is_finite
@@ -365,18 +365,11 @@ class Component:
 
     # ------------------------------------------------------------------ noise
     def _draw(self, per: str) -> None:
+        by = math.sqrt(self.h) if per == "second" else 1.0
         for stream, n in self._ports[per]:
-            size = getattr(self, n.name)
-            x: Any = floats(full(0.0, n.sample_shape))
-            if size != 0.0:
-                x = self._sample(size, stream, per)
-                if n.sample_shape:
-                    x = Vector([self._sample(size, stream + k, per) for k in range(n.sample_shape[0])])
-            setattr(self.noise, n.name, x)
-
-    def _sample(self, size: float, stream: int, per: str) -> float:
-        x = size * normal(int(self.seed), stream, self._tick)
-        return x / math.sqrt(self.h) if per == "second" else x
+            made = OnUse(self, stream, n.name)
+            several = [made[k] / by for k in range(math.prod(n.sample_shape))]
+            setattr(self.noise, n.name, Vector(several) if n.sample_shape else several[0])
 
     # ------------------------------------------------------------------ derivatives
     def _flow(self) -> list[float]:

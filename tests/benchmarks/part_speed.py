@@ -1,9 +1,8 @@
 """Time of one communication step of 1 ms of every native part: set inputs, step, get outputs.
 
 Run by hand: ``python tests/benchmarks/part_speed.py [--write] [--quick] [part ...]``.  Parameters (noise on) and inputs
-are those of the parts' reference runs, repeated; --quick: without flicker, twelve processes an axis.  The processor
-time of the best of many short rounds counts: the machine may be shared.  --write: mean, median and counts of all parts
-into docs/figures.toml.
+are those of the parts' reference runs, repeated; --quick: without flicker.  The processor time of the best of many
+short rounds counts: the machine may be shared.  --write: mean, median and counts of all parts into docs/figures.toml.
 """
 
 from __future__ import annotations

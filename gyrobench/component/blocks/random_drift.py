@@ -70,14 +70,15 @@ class Flicker(Block):
         if self.B > 0.0:
             before = self.passed
             now = floor(self.t * FINEST / self.tau)
-            self.passed = now
-            for j in range(RELAXATIONS):  # multiples of the slower ones are those of the faster ones, too
-                if now > before:
-                    a = exp((before - now) / HELD)
-                    self.relaxation[j] = a * self.relaxation[j] + sqrt(1.0 - a * a) * self.noise.B[j]
-                    before = floor(before / RATIO)
-                    now = floor(now / RATIO)
-            self.add_up()
+            if now > before:
+                self.passed = now
+                for j in range(RELAXATIONS):
+                    if now > before:  # multiples of the slower ones are those of the faster ones, too
+                        a = exp((before - now) / HELD)
+                        self.relaxation[j] = a * self.relaxation[j] + sqrt(1.0 - a * a) * self.noise.B[j]
+                        before = floor(before / RATIO)
+                        now = floor(now / RATIO)
+                self.add_up()
 
     def add_up(self) -> None:
         total = 0.0
