@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from gyrobench.files import write_whole
 from gyrobench.packaging import load_part
 from gyrobench.record.record import Record
 from gyrobench.reduction.series.gyro_noise import FLICKER_HIGH, FLICKER_LOW, gyro_noise
-from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients
 from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.result import Coefficient, Result
 from gyrobench.units import DPH
@@ -49,23 +47,17 @@ def columns_of(result: Result) -> Mapping[str, Mapping[str, Coefficient]]:
     return {name: terms for name, terms in columns.items() if len(terms) == len(TERMS)}
 
 
-def estimate_of(c: Coefficient, si: float) -> Estimate:
-    """Return a coefficient of a report, SI; of one without a value nothing but that it is not determined."""
-    if c.no_value or not math.isfinite(c.estimate):
-        return Estimate(0.0, 0.0, 0.0, False)
-    return Estimate(si * c.estimate, si * c.interval[0], si * c.interval[1], True)
-
-
-def processes_of(result: Result) -> list[list[tuple[float, float]]]:
-    """Return the Gauss-Markov processes of each column of a drift record, rms (rad/s) and correlation time (s), the
-    largest first.
+def model_of(result: Result, index: int) -> tuple[dict[str, float], list[tuple[float, float]]]:
+    """Return the noise model of a column of a drift record: N, B, K, R, Q and its Gauss-Markov processes, rms and
+    correlation time, the largest first, SI.  Raises UsageError where none describes the record.
     """
-    out = []
-    for column in (c for c in getattr(result, "columns", []) if c.unit == "°/h"):
-        tables = [t for t in column.tables.get("model", []) if t.id == "gauss_markov"]
-        rows = [(DPH * float(row[2]), float(row[5])) for t in tables for row in t.rows]
-        out.append(sorted(rows, reverse=True))
-    return out
+    column = [c for c in getattr(result, "columns", []) if c.unit == "°/h"][index]
+    tables = {t.id: t.rows for t in column.tables["model"]}
+    if "terms" not in tables:
+        raise UsageError("--fit-to: no noise model describes the record, its report says why; there are no values")
+    values = {str(row[0]): float(row[1]) * TERMS[row[0]][1] for row in tables["terms"]}
+    processes = [(DPH * float(row[2]), float(row[5])) for row in tables.get("gauss_markov", [])]
+    return {term: values.get(term, 0.0) for term in TERMS}, sorted(processes, reverse=True)
 
 
 def write_gyro_values(result: Result, record: Record, part: str, file: Path) -> None:
@@ -92,17 +84,14 @@ def write_gyro_values(result: Result, record: Record, part: str, file: Path) -> 
         *(f"# Warning of the reduction: {text}" for text in result.warnings),
         "[gyro]",
     ]
-    processes = processes_of(result)
     written: dict[str, str] = {}
     for number, channel in enumerate(channels):
         column = min(number, len(columns) - 1)
         coefficients = list(columns.values())[column]
-        found = processes[column] if column < len(processes) else []
-        n, b, k, r, q = (estimate_of(coefficients[term], TERMS[term][1]) for term in "NBKRQ")
-        noise = NoiseCoefficients(n, b, k, r, q)
+        noise, found = model_of(result, column)
         for name, value in gyro_noise(noise, interval, duration, found[0] if found else (0.0, 0.0)).items():
             term = OF.get(name)
-            said = f"  # {_words(coefficients[term])}" if term else ""
+            said = f"  # {_words(coefficients[term], noise[term] > 0.0)}" if term else ""
             if name == "flicker_tau":
                 said = f"  # flicker from {FLICKER_LOW / value:.2g} to {FLICKER_HIGH / value:.2g} Hz"
             if name == "markov" and len(found) > 1:
@@ -113,8 +102,8 @@ def write_gyro_values(result: Result, record: Record, part: str, file: Path) -> 
     write_whole(file, ("\n".join([*lines, *written.values()]) + "\n").encode())
 
 
-def _words(c: Coefficient) -> str:
+def _words(c: Coefficient, there: bool) -> str:
     if c.no_value:
-        return f"{c.name}: {c.no_value}"
+        return f"{c.name}: of the model as a whole, alone {c.no_value}" if there else f"{c.name}: {c.no_value}"
     low, high = c.interval
     return f"{c.name} = {c.estimate:.4g} {c.unit} ({low:.4g} to {high:.4g})"

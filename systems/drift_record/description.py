@@ -136,7 +136,7 @@ def slope_readings(noise: NoiseModel, allan: Deviation, units: ChannelUnits) -> 
     rows = []
     for term, (unit, si, _) in units.terms.items():
         row: list[Any] = [term, unit]
-        for e in (noise[term], getattr(read, term)):
+        for e in (noise[term], read[term]):
             row += [e.value / si if e.determined else None, e.low / si if e.determined else None, abs(e.high) / si]
         rows.append(row)
     head = ["coefficient", "unit", "model", "95 % from", "95 % to", "slopes", "from (slopes)", "to (slopes)"]

@@ -149,6 +149,20 @@ def _range(e: Estimate, si: float) -> list[float | None]:
     return [e.value / si if e.determined else None, e.low / si if e.determined else None, e.high / si]
 
 
+def terms(noise: NoiseModel, units: ChannelUnits) -> list[Table]:
+    """Return the terms of the model but its processes, as a simulation takes them."""
+    rows: list[list[Any]] = [
+        [term, value / units.terms[term][1], units.terms[term][0], "" if noise[term].determined else "not determined"]
+        for term, value in noise.terms.items()
+        if value
+    ]
+    caption = (
+        "With its Gauss-Markov processes and bands they make the deviation of the record, so that a simulation takes "
+        "all of them: one that is not determined alone stands for what the record does not tell it from"
+    )
+    return [Table("terms", "Terms of the model", caption, ["term", "value", "unit", "finding"], rows)]
+
+
 def gauss_markov(noise: NoiseModel, units: ChannelUnits) -> list[Table]:
     """Return the Gauss-Markov processes as a Kalman filter takes them."""
     rows: list[list[Any]] = []

@@ -230,7 +230,8 @@ def _column(a: Analysed, run: RunDocument) -> DriftColumn:
                            description.slope_readings(a.noise, a.deviations["allan"], p.units)],
             "spectrum": [*description.lines(p), *noise_tables.resonances(a.noise, p.units)],
             "stationarity": [model_tables.stationarity(m, p.units)],
-            "model": [*noise_tables.gauss_markov(a.noise, p.units), *model_tables.models(m, p.units)],
+            "model": [*(noise_tables.terms(a.noise, p.units) if a.noise.agrees else []),
+                      *noise_tables.gauss_markov(a.noise, p.units), *model_tables.models(m, p.units)],
         },
         texts={
             "acquisition": description.acquisition_texts(p, run),

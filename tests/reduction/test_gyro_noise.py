@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from gyrobench.reduction.series.gyro_noise import gyro_noise, slow_density
-from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients
 
 W = 2.0 * math.pi
 
@@ -16,14 +15,13 @@ W = 2.0 * math.pi
 def test_spectrum_of_the_coefficients() -> None:
     """B2 / w + K2 / w2 + w2 of the angle noise, at 1e-4 to 1 Hz, one at a time and together; flicker within 1 %."""
     f = np.logspace(-4.0, 0.0, 41)
-    none = Estimate(0.0, 0.0, 1.0, False)
-    b, k, q = (Estimate(x, 0.0, 1.0, True) for x in (3e-8, 2e-10, 4e-7))
+    b, k, q = 3e-8, 2e-10, 4e-7
     tau = 0.2 * 0.5  # of samples of 0.5 s
-    angle = (W * f) ** 2 * 2.0 * q.value**2 * tau / (1.0 + (W * f * tau) ** 2)
-    for B, K, Q in ((b, none, none), (none, k, none), (none, none, q), (b, k, q)):
-        noise = gyro_noise(NoiseCoefficients(none, B, K, none, Q), 0.5, 1e4)
-        expected = (B is b) * b.value**2 / (W * f) + (K is k) * (k.value / (W * f)) ** 2 + (Q is q) * angle
-        assert slow_density(noise, f) == pytest.approx(expected, rel=0.01 if B is b else 1e-12)
+    angle = (W * f) ** 2 * 2.0 * q**2 * tau / (1.0 + (W * f * tau) ** 2)
+    for B, K, Q in ((b, 0.0, 0.0), (0.0, k, 0.0), (0.0, 0.0, q), (b, k, q)):
+        noise = gyro_noise({"N": 0.0, "B": B, "K": K, "R": 0.0, "Q": Q}, 0.5, 1e4)
+        expected = B**2 / (W * f) + (K / (W * f)) ** 2 + (Q > 0.0) * angle
+        assert slow_density(noise, f) == pytest.approx(expected, rel=0.01 if B else 1e-12)
 
 
 def test_gauss_markov_and_nothing() -> None:

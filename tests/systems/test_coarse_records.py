@@ -116,7 +116,7 @@ def test_slopes_of_a_deviation_of_zero() -> None:
     many = np.full(5, 100)
     with np.errstate(all="raise"):
         found = slopes(Deviation("allan", tau, dev, 0.9 * dev, 1.1 * dev, 0.5 * many, many, 0 * many))
-    assert found.Q.determined and found.Q.value == pytest.approx(4.0 / math.sqrt(3.0))
+    assert found["Q"].determined and found["Q"].value == pytest.approx(4.0 / math.sqrt(3.0))
 
 
 @pytest.mark.parametrize(("n", "missing"), [(20_000, 0.1), (20_000, 0.2), (6_000, 0.04)])

@@ -265,7 +265,9 @@ def test_days(session: Session, tmp_path: Path) -> None:
 # ------------------------------------------------------------------------------------------ noise coefficients
 @pytest.mark.long
 def test_long_record_gives_noise_coefficients(session: Session) -> None:
-    """600 windows of 1 s: flicker and angle noise of the gyro lie in their intervals; 30 windows: no table."""
+    """600 windows of 1 s: flicker and angle noise of the gyro lie in their intervals, in a test of 600 windows the
+    flicker is not told from other slow noise; 30 windows: no table.
+    """
     values = {**SHORT, **QUIET, "gyro.white": 0.003 * DPH, "gyro.flicker": 0.05 * DPH, "gyro.quantization": 1e-6}
     short = reduced(session, {**values, "readings": 30})
     assert "Noise coefficients" not in [t.title for t in short.tables]
@@ -273,4 +275,5 @@ def test_long_record_gives_noise_coefficients(session: Session) -> None:
     (table,) = (t for t in long.tables if t.title == "Noise coefficients")
     rows = {row[0][0]: row for row in table.rows}
     for name, true in (("B", 0.05), ("Q", math.degrees(1e-6) * 3600.0)):
-        assert rows[name][2] < true < rows[name][3] and rows[name][1] == pytest.approx(true, rel=0.3)
+        assert rows[name][2] <= true <= rows[name][3]
+    assert rows["B"][5] == "not determined" and rows["Q"][1] == pytest.approx(math.degrees(1e-6) * 3600.0, rel=0.15)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from gyrobench.bench import UsageError
 from gyrobench.commands.arguments import read_settings
 from gyrobench.engine.session import Session
+from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.series.deviations import deviations
 from gyrobench.reduction.series.gyro_noise import gyro_noise, slow_density
-from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients, fit
 from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.result import Coefficient
 from gyrobench.system.system import load_system
@@ -45,57 +45,69 @@ def measured(rng: np.random.Generator) -> Array:
     return out
 
 
-def reported(noise: NoiseCoefficients, column: str = "") -> list[Coefficient]:
-    """Return the coefficients as the report of a drift record has them."""
+def only(**known: float) -> dict[str, float]:
+    """Return coefficients of which the others are none."""
+    return {term: known.get(term, 0.0) for term in TERMS}
+
+
+def reported(
+    noise: Mapping[str, float], processes: Sequence[tuple[float, float]] = (), column: str = ""
+) -> tuple[list[Coefficient], SimpleNamespace]:
+    """Return the coefficients and the tables of a column as the report of a drift record has them."""
     found = []
     for term, (unit, si, meaning) in TERMS.items():
-        e: Estimate = getattr(noise, term)
-        name, interval = f"{term} {column}".strip(), (e.low / si, e.high / si)
-        if e.determined:
-            found.append(Coefficient(name, meaning, unit, e.value / si, 0.0, 2.0, interval))
+        name, x = f"{term} {column}".strip(), noise[term] / si
+        if x:
+            found.append(Coefficient(name, meaning, unit, x, 0.0, 2.0, (0.5 * x, 2.0 * x)))
         else:
-            found.append(Coefficient(name, meaning, unit, math.nan, math.nan, 2.0, interval, no_value="not determined"))
-    return found
+            found.append(
+                Coefficient(name, meaning, unit, math.nan, math.nan, 2.0, (0.0, 1.0), no_value="not determined")
+            )
+    terms = [[term, noise[term] / si, unit, ""] for term, (unit, si, _) in TERMS.items() if noise[term]]
+    rows = [[k, 0.0, sigma / DPH, 0.0, 0.0, tau] for k, (sigma, tau) in enumerate(processes, 1)]
+    tables = [SimpleNamespace(id="terms", rows=terms), SimpleNamespace(id="gauss_markov", rows=rows)]
+    return found, SimpleNamespace(unit="°/h", tables={"model": tables})
 
 
 def written(
-    path: Path, coefficients: list[Coefficient], part: str = "floated_gyro", columns: Sequence[Any] = ()
+    path: Path, *columns: tuple[list[Coefficient], SimpleNamespace], part: str = "floated_gyro"
 ) -> Mapping[str, str]:
     t = np.arange(float(SAMPLES))
     run = SimpleNamespace(data=SimpleNamespace(file="gyro 7.csv"), series=None)
     record: Any = SimpleNamespace(windows={"t_start": t, "t_end": t + 1.0}, run=run)
-    result: Any = SimpleNamespace(system="drift_record", coefficients=coefficients, warnings=["the test line"],
-                                  columns=columns)  # fmt: skip
+    result: Any = SimpleNamespace(system="drift_record", coefficients=[c for found, _ in columns for c in found],
+                                  warnings=["the test line"], columns=[c for _, c in columns])  # fmt: skip
     write_gyro_values(result, record, part, path)
     return read_settings(path)
 
 
 @pytest.mark.long
 def test_record_gyro_record(tmp_path: Path) -> None:
-    """The values that the gyro was given lie in the intervals of its record, and the Allan deviations agree."""
+    """The gyro is given the whole model of a record, a white noise that is not determined alone, too: what it was given
+    lies in the intervals of its own record, and the Allan deviations agree.
+    """
     rate = measured(np.random.default_rng(2))
-    first = fit(rate, 1.0)
-    values = written(tmp_path / "floated_gyro.toml", reported(first))
+    first = fit_noise(rate, 1.0)
+    assert not first["N"].determined and first.terms["N"] > 0.0
+    values = written(tmp_path / "floated_gyro.toml", reported(first.terms))
     system = load_system("fixed_position").with_values({"readings": SAMPLES, "dwell": SAMPLES})
     with Session(system) as session:
         record = session.run({**values, "rebalance.meter": 0.0}, seed=4)
     given = record.run.parameters
     simulated = -float(given["gyro.k"]) * np.asarray(record.windows["mean"], dtype=float)
-    again = fit(simulated, 1.0)
+    again = fit_noise(simulated, 1.0)
     for name, parameter in PARAMETERS.items():
-        e, true = getattr(again, name), float(given[f"gyro.{parameter}"])
+        e, true = again[name], float(given[f"gyro.{parameter}"])
         assert e.low <= true <= e.high, name
-        found = getattr(first, name)
-        assert true == pytest.approx(found.value * found.determined, rel=1e-12), name
-    assert again.B.determined and again.Q.determined
+        assert true == pytest.approx(first.terms[name], rel=1e-12), name
+    assert again["Q"].determined
     was, now = (deviations(x, 1.0, ("allan",))["allan"] for x in (rate, simulated))
     assert now.deviation[:6] / was.deviation[:6] == pytest.approx(1.0, abs=0.12)  # to 32 s; 0.05 here
 
 
 def test_what_is_not_determined_is_off(tmp_path: Path) -> None:
     """N alone is known: the others are 0, Gauss-Markov drift and pickoff noise too; flicker lasts for the record."""
-    none, some = Estimate(0.0, 0.0, 1e-7, False), Estimate(2e-7, 1e-7, 3e-7, True)
-    noise = NoiseCoefficients(some, none, none, none, none)
+    noise = only(N=2e-7)
     expected = {"white": 2e-7, "flicker_tau": 1e5, "quantization_tau": 0.2, **dict.fromkeys(
         ("flicker", "walk", "ramp", "quantization", "markov", "pickoff"), 0.0)}  # fmt: skip
     assert gyro_noise(noise, 1.0, 1500.0) == expected
@@ -108,10 +120,8 @@ def test_what_is_not_determined_is_off(tmp_path: Path) -> None:
 
 def test_the_largest_gauss_markov_process_goes_into_the_gyro(tmp_path: Path) -> None:
     """0.5 deg/h of 200 s into the gyro, 0.1 deg/h of 20 s into the comment: the gyro has one process."""
-    some, none = Estimate(2e-7, 1e-7, 3e-7, True), Estimate(0.0, 0.0, 1e-7, False)
-    rows = [[1, 0.01, 0.1, 0.0, 0.0, 20.0], [2, 0.25, 0.5, 0.0, 0.0, 200.0]]
-    column = SimpleNamespace(unit="°/h", tables={"model": [SimpleNamespace(id="gauss_markov", rows=rows)]})
-    text = written(tmp_path / "v.toml", reported(NoiseCoefficients(some, none, none, none, none)), columns=[column])
+    noise = only(N=2e-7)
+    text = written(tmp_path / "v.toml", reported(noise, [(0.1 * DPH, 20.0), (0.5 * DPH, 200.0)]))
     assert float(text["gyro.markov"]) == pytest.approx(0.5 * DPH) and float(text["gyro.markov_tau"]) == 200.0
     assert "the largest of 2 processes" in (tmp_path / "v.toml").read_text("utf-8")
 
@@ -122,8 +132,7 @@ def test_flicker_of_a_fast_record_goes_to_half_its_sampling_rate() -> None:
     There w tau_11 = 7.49: 2 0.588 7.49/57.1 + 2 0.441 30.0/898 + 0.007 = 0.19.  A longer record than the 5.7 decades
     that a gyro has keeps its length.
     """
-    none, some = Estimate(0.0, 0.0, 1e-7, False), Estimate(2e-7, 1e-7, 3e-7, True)
-    noise = NoiseCoefficients(none, some, none, none, none)
+    noise = only(B=2e-7)
     f = np.geomspace(1.0 / 600.0, 50.0, 40)
     values = gyro_noise(noise, 0.01, 600.0)
     assert values["flicker_tau"] == pytest.approx(0.11 * 4.0**11 * 0.01)
@@ -136,17 +145,20 @@ def test_flicker_of_a_fast_record_goes_to_half_its_sampling_rate() -> None:
 
 def test_channels(tmp_path: Path) -> None:
     """A gyro with two channels takes one column for both, or two in their order; one with one channel takes one."""
-    none = Estimate(0.0, 0.0, 1e-7, False)
-    a, b = (NoiseCoefficients(Estimate(x, 0.5 * x, 2.0 * x, True), none, none, none, none) for x in (1e-7, 3e-7))
-    both = written(tmp_path / "v.toml", reported(a, "p") + reported(b, "q"), "gyro_2dof")
+    a, b = (only(N=x) for x in (1e-7, 3e-7))
+    both = written(tmp_path / "v.toml", reported(a, (), "p"), reported(b, (), "q"), part="gyro_2dof")
     assert [float(both[f"gyro.white_{c}"]) for c in "xy"] == pytest.approx([1e-7, 3e-7])
     assert {"gyro.flicker_tau", "gyro.quantization_tau", "gyro.markov_y"} <= set(both)
-    one = written(tmp_path / "v.toml", reported(a), "gyro_2dof")
+    one = written(tmp_path / "v.toml", reported(a), part="gyro_2dof")
     assert one["gyro.white_x"] == one["gyro.white_y"]
     load_system("eight_position").with_values(both)
     with pytest.raises(UsageError, match=r"columns p, q; floated_gyro has 1 channel: choose by --set channel=NAME"):
-        written(tmp_path / "v.toml", reported(a, "p") + reported(b, "q"))
+        written(tmp_path / "v.toml", reported(a, (), "p"), reported(b, (), "q"))
     with pytest.raises(UsageError, match="--fit-to site: it has no parameters white, flicker"):
-        written(tmp_path / "v.toml", reported(a), "site")
+        written(tmp_path / "v.toml", reported(a), part="site")
     with pytest.raises(UsageError, match=r"drift_record gives no coefficients N, B, K, R, Q"):
-        written(tmp_path / "v.toml", reported(a)[:2])
+        written(tmp_path / "v.toml", (reported(a)[0][:2], reported(a)[1]))
+    found, column = reported(a)
+    column.tables["model"] = []
+    with pytest.raises(UsageError, match="no noise model describes the record"):
+        written(tmp_path / "v.toml", (found, column))

@@ -13,10 +13,11 @@ from gyrobench.reduction.noise_model import posterior
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement, compare, squares_of_spectrum, with_spectrum
 from gyrobench.reduction.noise_model.maximum import Fitted
 from gyrobench.reduction.noise_model.noise_model import ABSENT
-from gyrobench.reduction.noise_model.ordinates import allan, filtered
-from gyrobench.reduction.noise_model.posterior import Cloud, quantile, size_of, weighted
+from gyrobench.reduction.noise_model.ordinates import allan, filtered, size_of
+from gyrobench.reduction.noise_model.posterior import Cloud, quantile, weighted
 from gyrobench.reduction.noise_model.search import ModelSearch
 from gyrobench.reduction.noise_model.treatment import Treated
+from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.deviations import Deviation, deviations
 
 SIMPLER = 1.5  # of the logarithm of the evidence: what a term must bring to be in the model that is reported
@@ -42,22 +43,27 @@ def deviations_of(raw: Array, treated: Treated) -> Scaled:
         removed[at] = raw[at] - s.done.x[s.done.wild]
     off = removed - np.nanmean(removed)
     own = deviations(raw - np.nanmean(raw), 1.0, ("allan",), fine=True)["allan"]
+    if not own.tau.size:
+        raise SeriesError("missing samples leave no differences that an Allan deviation is made of")
     quiet = float(np.nanmax(np.abs(off))) < 1e-9
     out = np.zeros(own.tau.size) if quiet else deviations(off, 1.0, ("allan",), fine=True)["allan"].deviation ** 2
     return Scaled(own, deviations(clean, 1.0, ("allan",), fine=True)["allan"], np.resize(out, own.tau.size))
 
 
 class Judge:
-    """Agreement of models with the record as it was, and as it was cleaned; intervals by the best model's spectrum."""
+    """Agreement of models with the record as it was, and as it was cleaned; intervals by the best model's spectrum.
 
-    def __init__(self, found: ModelSearch, scaled: Scaled, treated: Treated) -> None:
+    ramp: per sample, beside every model.
+    """
+
+    def __init__(self, found: ModelSearch, scaled: Scaled, treated: Treated, ramp: float) -> None:
         self.found, self.samples, self.means = found, treated.samples, found.data.grid.means
         squares = squares_of_spectrum(scaled.own.tau, *found.whole)
         self.own, self.clean = (with_spectrum(d, squares, treated.spread) for d in (scaled.own, scaled.clean))
         self.plain, self.removed = scaled.own, scaled.removed
         self.below = treated.below / self.own.tau  # is in the samples and not in the model
         peaks = found.resonances
-        self.peaks = np.sum([t.allan(q, self.own.tau, self.means) for t, q in peaks], axis=0) if peaks else 0.0
+        self.beside = sum((t.allan(q, self.own.tau, self.means) for t, q in peaks), 0.5 * (ramp * self.own.tau) ** 2)
 
     @property
     def ranked(self) -> list[Fitted]:
@@ -65,8 +71,8 @@ class Judge:
         return sorted(self.found.seen.values(), key=worth, reverse=True)
 
     def both(self, variance: Array) -> tuple[DeviationAgreement, DeviationAgreement]:
-        """Return the agreements of an Allan variance (k,) of the broadband terms, with a ramp if there is one."""
-        whole = np.maximum(variance + self.peaks + self.below, 0.0)
+        """Return the agreements of an Allan variance (k,) of the broadband terms."""
+        whole = np.maximum(variance + self.beside + self.below, 0.0)
         return (compare(self.own, np.sqrt(whole + self.removed), self.samples),
                 compare(self.clean, np.sqrt(whole[: self.clean.tau.size]), self.samples))  # fmt: skip
 
@@ -84,7 +90,7 @@ class Judge:
         tau = self.own.tau
 
         def plain(variance: Array) -> bool:
-            whole = np.maximum(variance + self.peaks + self.below, 0.0)
+            whole = np.maximum(variance + self.beside + self.below, 0.0)
             return compare(self.plain, np.sqrt(whole + self.removed), self.samples).holds_at_octaves
 
         others = [f for f in self.ranked if f.model != at.model and worth(f) > worth(at) - WELL]

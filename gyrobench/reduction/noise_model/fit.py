@@ -28,10 +28,19 @@ from gyrobench.reduction.noise_model.agreement import DeviationAgreement
 from gyrobench.reduction.noise_model.choice import Judge, deviations_of, filter_probability
 from gyrobench.reduction.noise_model.gap_completion import completed_by
 from gyrobench.reduction.noise_model.maximum import Fitted, maximize
-from gyrobench.reduction.noise_model.noise_model import ABSENT, Minimum, NoiseModel, Process, Scale, scale_of, times
+from gyrobench.reduction.noise_model.noise_model import (
+    ABSENT,
+    CALLED,
+    Minimum,
+    NoiseModel,
+    Process,
+    Scale,
+    scale_of,
+    times,
+)
 from gyrobench.reduction.noise_model.one_curve import steep_fall, weak_start
-from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, spectrum, split
-from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, size_of, weighted
+from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, size_of, spectrum, split
+from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, weighted
 from gyrobench.reduction.noise_model.search import GM, ModelSearch, search, search_again
 from gyrobench.reduction.noise_model.sensor_filters import DIGITAL, MEANS, Grid
 from gyrobench.reduction.noise_model.slow_changes import LevelChange, Settling, Swing, settling, swing
@@ -42,7 +51,6 @@ from gyrobench.reduction.series.noise_coefficients import Estimate
 
 Parts = list[tuple[NoiseTerm, Array]]
 
-CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
 WORTH = 0.01  # of the most probable model with a term: weight of one whose upper end counts
 LIKELY = 0.03  # part of the posterior of models of a kind, from which on an interval holds for them too
 PART = 0.25  # of the variance of several processes: one of them that counts as any
@@ -120,12 +128,11 @@ def _fit(treated: Treated, raw: Array, means: bool) -> _Fit:
     """Return the model of a treated record; raw (n,): as it was, in its unit."""
     treated, found = _without_changes(treated, means)
     clouds = posterior.draw(found)
-    judge = Judge(found, deviations_of(raw, treated), treated)
+    beside = posterior.beside_free_bands(clouds, found)
+    ramp = _ramp(found, beside)
+    judge = Judge(found, deviations_of(raw, treated), treated, ramp.value if ramp.determined else 0.0)
     at = judge.near_the_record(judge.choose(clouds), clouds)
-    clouds = posterior.beside_free_bands(clouds, found)
-    ramp = _ramp(found, clouds)
-    slow = 0.5 * (ramp.value * judge.own.tau) ** 2 if ramp.determined else 0.0
-    return _Fit(treated, found, clouds, at, ramp, judge.both(allan(at.model, at.p, judge.own.tau, means) + slow))
+    return _Fit(treated, found, beside, at, ramp, judge.both(allan(at.model, at.p, judge.own.tau, means)))
 
 
 # ------------------------------------------------------------------ changes of the level

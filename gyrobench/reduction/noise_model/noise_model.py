@@ -11,7 +11,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
 from gyrobench.reduction.noise_model.constancy import TermOverTime, over_time
-from gyrobench.reduction.noise_model.ordinates import Model, allan, spectrum, split
+from gyrobench.reduction.noise_model.ordinates import Model, allan, size_of, spectrum, split
 from gyrobench.reduction.noise_model.sensor_filters import ALL, MEANS, Grid, filter_of, passes_slow, samples_of
 from gyrobench.reduction.noise_model.slow_changes import Settling, Swing
 from gyrobench.reduction.noise_model.steps import LevelStep
@@ -21,6 +21,7 @@ from gyrobench.reduction.series.lines import SpectralLine
 from gyrobench.reduction.series.noise_coefficients import Estimate
 from gyrobench.reduction.series.row_pattern import rows_of_a_slower_record
 
+CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
 ABSENT = 0.025  # probability of its absence below which a term is determined
 
 
@@ -112,6 +113,19 @@ class NoiseModel:
     def __getitem__(self, name: str) -> Estimate:
         """Return a coefficient."""
         return self.coefficients[name]
+
+    @property
+    def terms(self) -> dict[str, float]:
+        """Return N, B, K, R, Q of the model as a whole, 0 where it has none.
+
+        With its processes and bands they make the record's deviation: also those that are not determined alone, which
+        stand for what the record does not tell them from.
+        """
+        found = {"R": self["R"].value if self["R"].determined else 0.0}
+        for name, term in CALLED.items():
+            v = size_of(term)(*self.shape)
+            found[name] = 0.0 if v is None else math.exp(0.5 * float(v)) * self.scale.units[name]
+        return found
 
     @property
     def agreement(self) -> DeviationAgreement:

@@ -22,7 +22,7 @@ leave nothing; of a taper w they are worth <w^2>^2/<w^4> of as many, and have no
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -342,6 +342,16 @@ def split(model: Model, p: Array) -> list[tuple[NoiseTerm, Array]]:
         out.append((term, p[..., at : at + term.size]))
         at += term.size
     return out
+
+
+def size_of(term: str) -> Callable[[Model, Array], Array | None]:
+    """Return the figure log variance of the first term of a name, of N the sum of white and readout noise."""
+
+    def figure(model: Model, p: Array) -> Array | None:
+        parts = [q[..., 0] for t, q in split(model, p) if t.name == term or (term == "white" and t.name == "readout")]
+        return np.logaddexp.reduce(parts, axis=0) if parts else None
+
+    return figure
 
 
 def joined(parts: Sequence[tuple[NoiseTerm, Array]]) -> tuple[Model, Array]:

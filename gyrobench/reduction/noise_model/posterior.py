@@ -149,13 +149,3 @@ def quantile(values: Array, weights: Array, share: float) -> float:
     reached = np.cumsum(weights[order])
     at = (reached - 0.5 * weights[order]) / reached[-1]
     return float(np.interp(share, at, values[order]))
-
-
-def size_of(term: str) -> Callable[[Model, Array], Array | None]:
-    """Return the figure log variance of the first term of a name, of N the sum of white and readout noise."""
-
-    def figure(model: Model, p: Array) -> Array | None:
-        parts = [q[..., 0] for t, q in split(model, p) if t.name == term or (term == "white" and t.name == "readout")]
-        return np.logaddexp.reduce(parts, axis=0) if parts else None
-
-    return figure

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.series.noise_coefficients import Estimate, NoiseCoefficients
 
 FLICKER_TAU = 1e5  # s, or the length of the record: flicker begins at 0.46 / tau, below its first frequency
 FLICKER_LOW, FLICKER_HIGH = 0.46, 0.055 * 4.0**11  # over tau: from and to where the PSD is that of flicker
@@ -14,27 +13,26 @@ ANGLE_TAU = 0.2  # of a sample: errors of readings one sample apart are correlat
 
 
 def gyro_noise(
-    noise: NoiseCoefficients, interval: float, duration: float, markov: tuple[float, float] = (0.0, 0.0)
+    noise: Mapping[str, float], interval: float, duration: float, markov: tuple[float, float] = (0.0, 0.0)
 ) -> dict[str, float]:
-    """Return parameters of ``floated_gyro`` by name, SI; interval, duration: s, of a sample and of the record.  markov:
-    rms (rad/s) and correlation time (s) of its Gauss-Markov process, 0: none.
+    """Return parameters of ``floated_gyro`` by name, SI; noise: N, B, K, R, Q, SI, 0 where there is none.
 
-    A coefficient that the record does not determine is 0.  Flicker goes to half the sampling rate or, of more samples
+    interval, duration: s, of a sample and of the record.  markov: rms (rad/s) and correlation time (s) of its
+    Gauss-Markov process, 0: none.
+
+    Flicker goes to half the sampling rate or, of more samples
     than 460,000, from the length of the record as far as the gyro has it, 5.7 decades.  The noise of a loop's current
     reading is not taken off N; the angle noise shows in the current where 0.2 interval is above the time constants of
     the loop.
     """
 
-    def size(e: Estimate) -> float:
-        return e.value if e.determined else 0.0
-
     return {
-        "white": size(noise.N),
-        "flicker": size(noise.B),
+        "white": noise["N"],
+        "flicker": noise["B"],
         "flicker_tau": max(duration, min(FLICKER_TAU, FLICKER_HIGH * 2.0 * interval)),
-        "walk": size(noise.K),
-        "ramp": size(noise.R),
-        "quantization": size(noise.Q),
+        "walk": noise["K"],
+        "ramp": noise["R"],
+        "quantization": noise["Q"],
         "quantization_tau": ANGLE_TAU * interval,
         "markov": markov[0],
         **({"markov_tau": markov[1]} if markov[0] else {}),

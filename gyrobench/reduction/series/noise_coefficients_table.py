@@ -1,4 +1,4 @@
-"""Table of the noise coefficients N, B, K, R, Q of a long test, for its report.  [DRIFT-COEFFICIENTS]"""
+"""Table of the noise coefficients N, B, K, R, Q of a long test, for its report.  [DRIFT-NOISE-MODEL]"""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ import numpy as np
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
-from gyrobench.reduction.series.noise_coefficients import JUST, fit
+from gyrobench.reduction.noise_model.fit import fit_noise
+from gyrobench.reduction.noise_model.treatment import LONG
+from gyrobench.reduction.series.checks import SeriesError
+from gyrobench.reduction.series.noise_coefficients import Estimate
 from gyrobench.result import DriftTestResult, Table
 from gyrobench.units import DPH
 
@@ -24,61 +27,70 @@ TERMS: Mapping[str, tuple[str, float, str]] = {
     "R": ("°/h²", DPH / 3600.0, "rate ramp"),
     "Q": ("″", units.factor("arcsec"), "angle noise of a reading"),
 }
-SLOW = ("B", "K")  # what a fit takes a part of
+ENDS = LONG + 1  # steps without a value that end a stretch of the noise model
 RESIDUAL = (
     "From the residuals of the fit: drift that its terms take up, of the period of a turn and longer, is missing here: "
-    "B and K may be larger and have no upper end, a ramp is not seen"
+    "slow noise may be larger and has no upper end, a ramp is not seen"
 )
 
 
 def noise_coefficients_table(result: DriftTestResult, record: Record, residual: bool = False) -> list[Table]:
     """Return the table, or none where a test has fewer than LEAST windows, or windows that do not stand end to end.
 
-    Of the drift rate itself, or of its residuals.  Each series of the result is a stretch of its own; missing windows,
-    and those of another length, are gaps.
+    By the noise model of the drift rate itself, or of its residuals.  Each series of the result is a stretch of its
+    own; missing windows, and those of another length, are gaps.
     """
     start, end = (np.asarray(record.windows[n], dtype=float) for n in ("t_start", "t_end"))
     length = float(np.median(end - start)) if start.size else 0.0
     if sum(len(s.t) for s in result.series) < LEAST:
         return []
     stretches = [on_grid(np.array(s.t), np.array(s.residual if residual else s.y), length) for s in result.series]
+    rate = DPH * np.concatenate([x for s in stretches for x in (s, np.full(ENDS, math.nan))])
     try:
-        found = fit([DPH * x for x in stretches], length)
-    except ValueError:
+        noise = fit_noise(rate, length)
+    except SeriesError:
         return []  # constant, or a gap after each window
-    rows: list[list[Any]] = []
-    for name, (unit, si, meaning) in TERMS.items():
-        if residual and name == "R":
-            continue
-        e = getattr(found, name)
-        value = e.value / si if e.determined else None
-        high = None if residual and name in SLOW else float(e.high) / si
-        finding = "just determined" if e.just_determined else "" if e.determined else "not determined"
-        rows.append([f"{name}, {meaning}", value, float(e.low) / si, high, unit, finding])
-    count = sum(int(np.isfinite(x).sum()) for x in stretches)
-    caption = (
-        f"IEEE 952, from {count} means of {length:g} s by maximum likelihood; not determined: the interval holds 0. "
-        "Gauss-Markov drift is not among the five terms: B and K take it up"
-    )
-    if just := [row[0].partition(",")[0] for row in rows if row[5] == "just determined"]:
-        caption = f"{caption}. {', '.join(just)}: {JUST}"
-    if found.check is not None and (departs := found.check.finding()):
-        caption = f"{departs}. {caption}"
-    columns = ["coefficient", "value", "95 % from", "95 % to", "unit", "finding"]
-    title = "Noise coefficients"
+    rows = [
+        _row(f"{name}, {meaning}", noise[name], si, unit, noise.agrees, residual and name in ("B", "K"))
+        for name, (unit, si, meaning) in TERMS.items()
+        if name != "R" or not residual
+    ]
+    for g in noise.processes if noise.agrees else ():
+        rows.append(_row("σ, Gauss-Markov drift", g.sigma, DPH, "°/h", True, residual))
+        rows.append(_row("τ, Gauss-Markov drift", g.tau, 1.0, "s", True, residual))
+    caption = f"IEEE 952, from {int(np.isfinite(rate).sum())} means of {length:g} s by their noise model"
+    if not noise.agrees:
+        caption = f"The noise model does not describe the record, so that no coefficient is stated. {caption}"
+    elif (t := noise.treatment).lines or t.changes or t.wild.size:
+        caption = (
+            f"{caption}; taken out before: {len(t.lines)} lines, {len(t.changes)} steps or slow changes, {t.wild.size} "
+            "wild values"
+        )
     caption = f"{caption}. {RESIDUAL}" if residual else caption
-    return [Table("noise_coefficients", title, caption, columns, rows)]
+    columns = ["coefficient", "value", "95 % from", "95 % to", "unit", "finding"]
+    return [Table("noise_coefficients", "Noise coefficients", caption, columns, rows)]
+
+
+def _row(name: str, e: Estimate, si: float, unit: str, stated: bool, no_end: bool) -> list[Any]:
+    """Return a row of an estimate; no_end: it may be larger."""
+    if not stated:
+        return [name, None, None, None, unit, "not determined"]
+    value, high = e.value / si if e.determined else None, None if no_end else e.high / si
+    return [name, value, e.low / si, high, unit, "" if e.determined else "not determined"]
 
 
 def on_grid(t: Array, x: Array, step: float) -> Array:
-    """Return values in the order of their times, NaN where one is missing.
+    """Return values in the order of their times on a grid of steps, NaN where one is missing.
 
-    A time that does not follow the one before by a step, within a hundredth of it, begins a gap.
+    A time that is no multiple of the step after the one before, within a hundredth of it, ends a stretch of the noise
+    model, as a long gap does.
     """
     order = np.argsort(t, kind="stable")
     t, x = t[order], x[order]
-    follows = np.abs(np.diff(t) - step) < 0.01 * step
-    places = np.concatenate([[0], np.cumsum(np.where(follows, 1, 2))])
+    steps = np.diff(t) / step
+    whole = np.rint(steps)
+    on = (np.abs(steps - whole) < 0.01) & (whole > 0.0)
+    places = np.cumsum(np.append(0.0, np.where(on, np.minimum(whole, ENDS), ENDS))).astype(int)
     out = np.full(int(places[-1]) + 1, math.nan)
     out[places] = x
     return out
