@@ -41,6 +41,7 @@ TRUTHS: dict[str, dict[str, Any]] = {
     "low-pass, one process, walk": {"N": 1.0, "lag": 0.56, "markov": [(0.05, 200.0)], "K": 3e-4},
     "one process": {"N": 1.0, "markov": [(0.0444, 270.0)]},
     "mean of 3, three processes": {"N": 1.0, "mean": 3, "markov": [(0.3, 12.0), (0.15, 150.0), (0.15, 1500.0)]},
+    "a ramp over white noise and a drift": {"N": 1.0, "markov": [(0.0444, 270.0)], "R": 2e-4},
     "angle noise, one process": {"N": 0.1, "Q": 1.0, "markov": [(0.02, 100.0)]},
     "ring laser": {"N": 0.005, "Q": 1.0, "swings": [(2.0, 2.94, 400.0), (0.3, 0.9, 1000.0), (0.1, 1.9, 100.0)]},
     "flicker, barely seen in 3,600 samples": {"N": 1.0, "B": 0.12},
@@ -94,6 +95,7 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
         angle = lfilter([1.0], [1.0, -2.0 * r * math.cos(omega / FINE), r * r], noise)[::FINE]
         x = x + np.diff(rms / angle.std() * angle[-n - 1 :])
     x = x + np.cumsum(truth.get("K", 0.0) * rng.normal(size=n)) + np.diff(truth.get("Q", 0.0) * rng.normal(size=n + 1))
+    x = x + truth.get("R", 0.0) * np.arange(n)
     sd = math.sqrt(0.5 * float(np.mean(np.diff(x) ** 2)))
     if "wild" in kinds:
         x = x + 20.0 * sd * rng.choice([-1.0, 1.0], n) * (rng.random(n) < 1e-3)
