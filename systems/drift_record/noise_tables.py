@@ -151,10 +151,11 @@ def _range(e: Estimate, si: float) -> list[float | None]:
 
 def terms(noise: NoiseModel, units: ChannelUnits) -> list[Table]:
     """Return the terms of the model but its processes, as a simulation takes them."""
+    found = noise.terms
     rows: list[list[Any]] = [
-        [term, value / units.terms[term][1], units.terms[term][0], "" if noise[term].determined else "not determined"]
-        for term, value in noise.terms.items()
-        if value
+        [term, found[term] / si, unit, "" if noise[term].determined else "not determined"]
+        for term, (unit, si, _) in units.terms.items()
+        if found[term]
     ]
     caption = (
         "With its Gauss-Markov processes and bands they make the deviation of the record, so that a simulation takes "
