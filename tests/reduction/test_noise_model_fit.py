@@ -362,18 +362,6 @@ def test_a_step_under_angle_noise() -> None:
     assert abs(step.at - 6000) < 300 and abs(step.size - 0.02) < 4.0 * step.u < 0.004
 
 
-@pytest.mark.parametrize("rise", [1.0, 30.0])  # over the record, of a noise of 1
-def test_a_ramp_is_no_flicker(rise: float) -> None:
-    """The standard deviation of the slope over n samples is sqrt(12/n^3), over the record 0.08: both are far above."""
-    n = 2000
-    for seed in range(5):
-        x = np.random.default_rng([31, seed]).normal(size=n) + rise / n * np.arange(n)
-        found = fit_noise(x, 1.0)
-        assert found.agrees and found.processes == () and not any(found[t].determined for t in "BKQ")
-        assert found["N"].low < 1.0 < found["N"].high
-        assert found["R"].determined and found["R"].value == pytest.approx(rise / n, abs=4.0 * math.sqrt(12.0 / n**3))
-
-
 def test_what_is_refused() -> None:
     with pytest.raises(SeriesError, match="leave no differences"):
         fit_noise(np.where(np.arange(1000) % 2, np.nan, np.random.default_rng(1).normal(size=1000)), 1.0)

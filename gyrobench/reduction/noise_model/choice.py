@@ -28,14 +28,19 @@ DEEP = 20.0  # below the greatest logarithm of the posterior: such a draw is no 
 
 @dataclass(frozen=True)
 class Scaled:
-    """Deviations of the record as it was and as it was cleaned, tau in samples, in units of ``size``."""
+    """Deviations of the record as it was and as it was cleaned, tau in samples, in units of ``size``.
+
+    ramp, removed (k,): Allan variances of the ramp, and of it and what was taken out together.
+    """
 
     own: Deviation
     clean: Deviation
+    ramp: Array
     removed: Array
 
 
-def deviations_of(raw: Array, treated: Treated) -> Scaled:
+def deviations_of(raw: Array, treated: Treated, ramp: float) -> Scaled:
+    """Return the deviations of a record (n,) with its ramp per sample."""
     clean = treated.cleaned()
     removed = raw - np.where(np.isfinite(clean), clean, 0.0)
     for s in treated.stretches:  # of a wild sample what it exceeds its neighbours' word by
@@ -45,25 +50,24 @@ def deviations_of(raw: Array, treated: Treated) -> Scaled:
     own = deviations(raw - np.nanmean(raw), 1.0, ("allan",), fine=True)["allan"]
     if not own.tau.size:
         raise SeriesError("missing samples leave no differences that an Allan deviation is made of")
-    quiet = float(np.nanmax(np.abs(off))) < 1e-9
-    out = np.zeros(own.tau.size) if quiet else deviations(off, 1.0, ("allan",), fine=True)["allan"].deviation ** 2
-    return Scaled(own, deviations(clean, 1.0, ("allan",), fine=True)["allan"], np.resize(out, own.tau.size))
+    out = slow = 0.5 * (ramp * own.tau) ** 2
+    if float(np.nanmax(np.abs(off))) > 1e-9:
+        out = deviations(off + ramp * np.arange(off.size), 1.0, ("allan",), fine=True)["allan"].deviation ** 2
+    clear = deviations(clean, 1.0, ("allan",), fine=True)["allan"]
+    return Scaled(own, clear, slow, np.resize(out, own.tau.size))
 
 
 class Judge:
-    """Agreement of models with the record as it was, and as it was cleaned; intervals by the best model's spectrum.
+    """Agreement of models with the record as it was, and as it was cleaned; intervals by the best model's spectrum."""
 
-    ramp: per sample, beside every model.
-    """
-
-    def __init__(self, found: ModelSearch, scaled: Scaled, treated: Treated, ramp: float) -> None:
+    def __init__(self, found: ModelSearch, scaled: Scaled, treated: Treated) -> None:
         self.found, self.samples, self.means = found, treated.samples, found.data.grid.means
         squares = squares_of_spectrum(scaled.own.tau, *found.whole)
         self.own, self.clean = (with_spectrum(d, squares, treated.spread) for d in (scaled.own, scaled.clean))
-        self.plain, self.removed = scaled.own, scaled.removed
+        self.plain, self.removed, self.ramp = scaled.own, scaled.removed, scaled.ramp
         self.below = treated.below / self.own.tau  # is in the samples and not in the model
         peaks = found.resonances
-        self.beside = sum((t.allan(q, self.own.tau, self.means) for t, q in peaks), 0.5 * (ramp * self.own.tau) ** 2)
+        self.peaks = np.sum([t.allan(q, self.own.tau, self.means) for t, q in peaks], axis=0) if peaks else 0.0
 
     @property
     def ranked(self) -> list[Fitted]:
@@ -72,9 +76,9 @@ class Judge:
 
     def both(self, variance: Array) -> tuple[DeviationAgreement, DeviationAgreement]:
         """Return the agreements of an Allan variance (k,) of the broadband terms."""
-        whole = np.maximum(variance + self.beside + self.below, 0.0)
-        return (compare(self.own, np.sqrt(whole + self.removed), self.samples),
-                compare(self.clean, np.sqrt(whole[: self.clean.tau.size]), self.samples))  # fmt: skip
+        noise = np.maximum(variance + self.peaks + self.below, 0.0)
+        return (compare(self.own, np.sqrt(noise + self.removed), self.samples),
+                compare(self.clean, np.sqrt((noise + self.ramp)[: self.clean.tau.size]), self.samples))  # fmt: skip
 
     def share(self, variance: Array) -> float:
         """Return the least share of averaging times that agree; 1 where enough do."""
@@ -90,7 +94,7 @@ class Judge:
         tau = self.own.tau
 
         def plain(variance: Array) -> bool:
-            whole = np.maximum(variance + self.beside + self.below, 0.0)
+            whole = np.maximum(variance + self.peaks + self.below, 0.0)
             return compare(self.plain, np.sqrt(whole + self.removed), self.samples).holds_at_octaves
 
         others = [f for f in self.ranked if f.model != at.model and worth(f) > worth(at) - WELL]

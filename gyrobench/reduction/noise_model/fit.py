@@ -130,7 +130,7 @@ def _fit(treated: Treated, raw: Array, means: bool) -> _Fit:
     clouds = posterior.draw(found)
     beside = posterior.beside_free_bands(clouds, found)
     ramp = _ramp(found, beside)
-    judge = Judge(found, deviations_of(raw, treated), treated, ramp.value if ramp.determined else 0.0)
+    judge = Judge(found, deviations_of(raw, treated, ramp.value if ramp.determined else 0.0), treated)
     at = judge.near_the_record(judge.choose(clouds), clouds)
     return _Fit(treated, found, beside, at, ramp, judge.both(allan(at.model, at.p, judge.own.tau, means)))
 

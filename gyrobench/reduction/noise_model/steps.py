@@ -3,7 +3,8 @@
 In the cosine transform a step at s has the ordinates -sqrt(2/n) sin(omega_k s)/(2 sin(omega_k/2)); with b(s) the sum of
 P x over the samples from s on, its size is b/d and the ratio b^2/d, d(s) = sum of sin^2(omega_k s)/(2 n sin^2 S_k).
 The errors of the end angles, of variance q2, add a rank u to the covariance of each parity: P = D - c D u u' D with
-D = diag(1/S), c = 2 q2/(1 + 2 q2 u'D u), u_k = sqrt(2/n) cos(omega_k/2).  The level itself is free.
+D = diag(1/S), c = 2 q2/(1 + 2 q2 u'D u), u_k = sqrt(2/n) cos(omega_k/2).  The level itself is free, and a ramp: with r
+its ordinates and g(s) the sum of P r from s on, b is less by g r'P x/r'P r, d by g^2/r'P r.
 [DRIFT-NOISE-MODEL; own derivation]
 """
 
@@ -35,8 +36,8 @@ class LevelStep:
 
 
 def step_ratios(x: Array, S: Array, q2: float = 0.0) -> tuple[Array, Array, Array]:
-    """Return likelihood ratio, size and standard deviation (n,) of a step at each sample of x (n,); S (n,): spectrum at
-    omega = pi k/n, S[0] is not used; q2: variance of the error of an angle.
+    """Return likelihood ratio, size and standard deviation (n,) of a step at each sample of x (n,) beside a ramp; S
+    (n,): spectrum at omega = pi k/n, S[0] is not used; q2: variance of the error of an angle.
     """
     n = x.size
     weigh, ends = precision(S, q2, n)
@@ -46,7 +47,10 @@ def step_ratios(x: Array, S: Array, q2: float = 0.0) -> tuple[Array, Array, Arra
         y = fft.idct(ordinates, norm="ortho")
         return -np.concatenate([[0.0], np.cumsum(y)[:-1]])
 
-    b = passed(weigh(fft.dct(x, norm="ortho")))
+    c, ramp = (fft.dct(y, norm="ortho") for y in (x, np.arange(n) / n))
+    of_ramp = weigh(ramp)
+    g, info = passed(of_ramp), float(ramp @ of_ramp)
+    b = passed(weigh(c)) - g * float(of_ramp @ c) / info
     half = 0.5 * math.pi * np.arange(1, n) / n
     a = np.zeros(n)
     a[1:] = 1.0 / (4.0 * S[1:] * np.sin(half) ** 2)
@@ -54,6 +58,7 @@ def step_ratios(x: Array, S: Array, q2: float = 0.0) -> tuple[Array, Array, Arra
     d = (a.sum() - np.real(fft.fft(a))) / n
     for share, weighed in ends:
         d = d - share * passed(weighed) ** 2
+    d = d - g * g / info
     d[:EDGE] = d[n - EDGE :] = np.inf
     d[0] = np.inf
     d = np.maximum(d, 1e-300)
