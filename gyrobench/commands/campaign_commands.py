@@ -55,6 +55,7 @@ def sweep(
     scheduler: options.Scheduler = None,
     retry: options.Retry = False,
     site: options.WithSite = False,
+    language: options.SiteLanguage = "en",
     certificate: options.WithCertificate = False,
     strict: options.Strict = False,
     as_json: options.Json = False,
@@ -82,7 +83,10 @@ def sweep(
     axes = run_campaign.require_over(over, seeds, data, table)
     definition = run_campaign.from_arguments(system, axes, seeds, values, part, mapping, more)
     store = out or run_campaign.default_out(definition, True)
-    if not run_campaign.run(definition, store, scheduler, workers, retry, as_json, site, certificate) and strict:
+    if (
+        not run_campaign.run(definition, store, scheduler, workers, retry, as_json, site, certificate, language)
+        and strict
+    ):
         raise typer.Exit(1)
 
 
@@ -94,6 +98,7 @@ def campaign(
     scheduler: options.Scheduler = None,
     retry: options.Retry = False,
     site: options.WithSite = False,
+    language: options.SiteLanguage = "en",
     strict: options.Strict = False,
     as_json: options.Json = False,
 ) -> None:
@@ -110,7 +115,7 @@ def campaign(
 
     definition = read_definition(file)
     store = out or definition.out or run_campaign.default_out(definition, False)
-    if not run_campaign.run(definition, store, scheduler, workers, retry, as_json, site) and strict:
+    if not run_campaign.run(definition, store, scheduler, workers, retry, as_json, site, language=language) and strict:
         raise typer.Exit(1)
 
 
@@ -123,6 +128,7 @@ def site(
     publish: Annotated[
         Path | None, typer.Option("--publish", metavar="DIR", help="Folder for all of it, reports included.")
     ] = None,
+    language: options.SiteLanguage = "en",
 ) -> None:
     """Write the site of a campaign as static pages.
 
@@ -136,7 +142,7 @@ def site(
     """
     from gyrobench.commands.campaign_site import write
 
-    write(campaign, out, publish)
+    write(campaign, out, publish, language)
 
 
 @app.command()

@@ -8,7 +8,7 @@ from pathlib import Path
 from gyrobench.bench import Bench, UsageError, display_path
 
 
-def write(url: str, out: Path | None, publish: Path | None) -> None:
+def write(url: str, out: Path | None, publish: Path | None, language: str) -> None:
     """Write the site, print what it answers and where it is."""
     from gyrobench.campaign.execution.store import Campaign
     from gyrobench.campaign.site.site_folder import write_site
@@ -16,7 +16,7 @@ def write(url: str, out: Path | None, publish: Path | None) -> None:
 
     campaign = Campaign.open(url)
     print_notes(campaign.notes)
-    written = write_site(campaign, out, publish)
+    written = write_site(campaign, out, publish, language)
     for sentence in written.answer:
         print(sentence)
     print(display_path(written.index))
@@ -31,7 +31,7 @@ def are_campaigns(folders: Sequence[Path]) -> bool:
     return any(found)
 
 
-def compare(folders: Sequence[Path], out: Path | None, as_json: bool) -> None:
+def compare(folders: Sequence[Path], out: Path | None, as_json: bool, language: str) -> None:
     """Write and print what the second campaign differs in from the first beyond chance.  Raises UsageError."""
     from gyrobench.campaign.analysis.campaign_comparison import compare_campaigns
     from gyrobench.campaign.execution.store import Campaign
@@ -44,5 +44,5 @@ def compare(folders: Sequence[Path], out: Path | None, as_json: bool) -> None:
     campaigns = [Campaign.open(f) for f in folders]
     print_notes(note for campaign in campaigns for note in campaign.notes)
     doc = compare_campaigns(*campaigns)
-    paths = write_comparison(doc, out or comparison_folder(folders), Bench.find().folder)
+    paths = write_comparison(doc, out or comparison_folder(folders), Bench.find().folder, language)
     print_report_files(paths, None if as_json else "\n".join(doc["answer"]))

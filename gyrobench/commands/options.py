@@ -96,6 +96,7 @@ WithCertificate = Annotated[
     bool, typer.Option("--certificate", help="Write the certificate, too; needs laboratory.toml.")
 ]
 Language = Annotated[str, typer.Option("--language", metavar="en|zh", help="Language of the report.")]
+SiteLanguage = Annotated[str, typer.Option("--language", metavar="en|zh", help="Language of the site.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace another run in the folder --out.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue this run from where it was interrupted.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder to write to.")]

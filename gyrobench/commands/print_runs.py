@@ -10,6 +10,7 @@ from gyrobench.bench import UsageError, display_path
 from gyrobench.commands import console
 from gyrobench.commands.progress_display import ProgressDisplay
 from gyrobench.report import FORMATS
+from gyrobench.report.language import ENGLISH
 from gyrobench.report.plain_text import format_result, format_summary
 from gyrobench.result import NO_VERDICT
 from gyrobench.system.suite import Suite
@@ -135,14 +136,14 @@ def reduce_result(
     return _print_outcome(reduce_result(request, test, source, FEEDBACK), as_json)
 
 
-def compare(runs: Sequence[Path], out: Path | None, as_json: bool = False) -> None:
+def compare(runs: Sequence[Path], out: Path | None, as_json: bool = False, language: str = ENGLISH) -> None:
     """Write and print the comparison of several runs; the first is the baseline.  Raises UsageError."""
     from gyrobench.workflow.run_comparison import compare_folders, comparison_folder
 
     comparison = compare_folders(runs)
     if comparison.note:
         console.print_note(f"note: {comparison.note}")
-    paths = comparison.write(out or comparison_folder(runs))
+    paths = comparison.write(out or comparison_folder(runs), language=language)
     console.print_report_files(paths, None if as_json else format_summary(comparison.document))
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from gyrobench.bench import Bench, UsageError, display_path
 from gyrobench.commands import console
 from gyrobench.commands.progress_display import ProgressDisplay
+from gyrobench.report.language import ENGLISH
 
 if TYPE_CHECKING:
     from gyrobench.campaign.execution.campaign_execution import CampaignOutcome
@@ -73,10 +74,11 @@ def run(
     as_json: bool,
     site: bool = False,
     certificate: bool = False,
+    language: str = ENGLISH,
 ) -> bool:
     """Execute a campaign and print what it has; return whether every run is done and none fails its specification.
 
-    site, certificate: write the site of the campaign, and the certificate of its lot, too.
+    site, certificate: write the site of the campaign, in a language, and the certificate of its lot, too.
     """
     from gyrobench.campaign.execution.campaign_execution import execute_campaign
 
@@ -90,7 +92,7 @@ def run(
     if site:
         from gyrobench.campaign.site.site_folder import write_site
 
-        written = write_site(outcome.campaign)
+        written = write_site(outcome.campaign, language=language)
         if not as_json:
             print("", *written.answer, display_path(written.index), sep="\n")
     if certificate:

@@ -195,6 +195,7 @@ def report(
 def compare(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="Folders; the first is the baseline.")],
     out: options.Out = None,
+    language: options.Language = "en",
     as_json: options.Json = False,
 ) -> None:
     """Compare runs side by side, or two campaigns.
@@ -209,9 +210,9 @@ def compare(
     from gyrobench.commands import campaign_site, print_runs
 
     if campaign_site.are_campaigns(runs):
-        campaign_site.compare(runs, out, as_json)
+        campaign_site.compare(runs, out, as_json, language)
     else:
-        print_runs.compare(runs, out, as_json)
+        print_runs.compare(runs, out, as_json, language)
 
 
 @app.command()

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gyrobench.boundary import checked
-from gyrobench.library.experiment import File
+from gyrobench.library.experiment import File, path_of
+from gyrobench.report.language import ENGLISH
 
 if TYPE_CHECKING:
     import pandas
@@ -72,18 +73,19 @@ def sweep(
 
 
 @checked
-def site(campaign: File, out: File | None = None, *, publish: File | None = None) -> CampaignSite:
+def site(
+    campaign: File, out: File | None = None, *, publish: File | None = None, language: str = ENGLISH
+) -> CampaignSite:
     """Write the site of a stored campaign; ``.index`` is its page, ``.answer`` the sentences with which it opens.
 
     campaign: folder or URL, the ``out`` of :func:`campaign` or :func:`sweep`.  out: folder of the site, default
-    ``site`` in the campaign.  publish: a folder that shall hold everything, reports included.  Raises errors of type
-    GyrobenchError.
+    ``site`` in the campaign.  publish: a folder that shall hold everything, reports included.  language: of the page,
+    en or zh.  Raises errors of type GyrobenchError.
     """
     from gyrobench.campaign.execution.store import Campaign
     from gyrobench.campaign.site.site_folder import write_site
 
-    places = (None if p is None else Path(p) for p in (out, publish))
-    return write_site(Campaign.open(campaign), *places)
+    return write_site(Campaign.open(campaign), path_of(out), path_of(publish), language)
 
 
 def _executed(

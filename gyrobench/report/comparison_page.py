@@ -25,7 +25,8 @@ from gyrobench.report.page_model import (
     text_cell,
 )
 from gyrobench.report.replicates import ComparedRun, Draws
-from gyrobench.report.result_json import content_hash, plain
+from gyrobench.report.result_json import content_hash, plain, value_at
+from gyrobench.report.result_page import date
 from gyrobench.report.style import HALF, figure, styled, svg
 from gyrobench.report.tables import compact
 from gyrobench.result import Coefficient, DriftTestResult, LoopResult, Response, Result
@@ -34,6 +35,8 @@ from gyrobench.result_content import content, typed
 Json = dict[str, Any]
 SCHEMA = "gyrobench-comparison-1"
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+SAID = ("method", "noise model", "instrument", "date")  # settings whose values are said in the language of the page
+_LONGEST = 60  # characters of a value
 _ABREAST = 3  # runs in one table, so that it fits on paper
 
 
@@ -151,7 +154,7 @@ def page(doc: Json) -> Page:
     head = [
         ("Report", doc["report_id"]),
         ("Baseline", f"{base}, {runs[doc['baseline']]['name']}"),
-        ("Runs", ", ".join(f"{_letter(k)} {run['name']}" for k, run in enumerate(runs))),
+        ("Runs", _called(runs)),
     ]
     titles = dict.fromkeys(run["title"] for run in runs)
     with styled():
@@ -168,6 +171,19 @@ def page(doc: Json) -> Page:
             Section("Common settings", "equal", _equal(doc)),
         ]
     return Page(f"Comparison: {'; '.join(titles)}", doc["report_id"], head, sections).finish()
+
+
+def own_texts(doc: Json) -> list[str]:
+    """Return what is the same in every language: how the runs are called, names within the plan, values cut short."""
+    named = [(_letter(k), run["name"]) for k, run in enumerate(doc["runs"])]
+    calls = [form.format(*n) for n in named for form in ("{1}", "{0} {1}", "{0}, {1}", "{0} ({1})")]
+    rows = [(r["what"], v) for r in (*doc["differing"], *doc["equal"]) for v in r.get("values", [r.get("value")])]
+    parts = [p for what, v in rows for p in (what.partition(", ")[2], compact(v, _LONGEST).rpartition("… (")[0])]
+    return [*calls, _called(doc["runs"]), *filter(None, parts)]
+
+
+def _called(runs: Sequence[Json]) -> str:
+    return ", ".join(f"{_letter(k)} {run['name']}" for k, run in enumerate(runs))
 
 
 def side_tables(doc: Json) -> list[PageTable]:
@@ -213,14 +229,14 @@ def _runs(doc: Json) -> PageTable:
         Row(
             [
                 text_cell(_letter(k), "strong"),
-                *(text_cell(run[c]) for c in ("name", "system", "report_id")),
+                *(text_cell(run[c], own=True) for c in ("name", "system", "report_id")),
                 *([text_cell(", ".join(map(str, run["seeds"])) or "–")] if pooled else []),
                 text_cell(run["verdict"], run["verdict"]),
             ]
         )
         for k, run in enumerate(doc["runs"])
     ]
-    columns = [Column(""), Column("run", wide=True), Column("system"), Column("report")]
+    columns = [Column(""), Column("name", wide=True), Column("system"), Column("report")]
     columns += [*([Column("seeds")] if pooled else []), Column("verdict")]
     means = " Runs that differ in the seed alone are one: estimates are means over the seeds, u their standard errors."
     return PageTable(columns, rows, f"Runs.{means if pooled else ''}")
@@ -247,15 +263,17 @@ def _differing(doc: Json) -> list[Any]:
 
 
 def _value(doc: Json, path: tuple[str | int, ...]) -> Cell:
-    """Return a fact as text; numbers carry their full value and their place in ``comparison.json``."""
+    """Return a fact as text; numbers carry their full value and their place in ``comparison.json``.
+
+    Values are as they were given, in every language; what the bench says of a method or a model is in that of the page.
+    """
     cell = number_cell(doc, path, significant=8)
     if not cell.number:
-        value: Any = doc
-        for key in path:
-            value = value[key]
-        text = value if isinstance(value, str) else compact(value, 60)
-        return Cell(_broken(text))
-    return Cell(cell.text, full=cell.full, pointer=cell.pointer)
+        value = value_at(doc, *path)
+        text = date(value) if isinstance(value, str) else compact(value, _LONGEST)
+        said = value_at(doc, *path[:2])["what"] in SAID or text.endswith(" entries)")
+        return Cell(_broken(text), own=not said)
+    return Cell(cell.text, full=cell.full, pointer=cell.pointer, own=True)
 
 
 def _broken(text: str) -> str:

@@ -71,6 +71,7 @@ def _settings(differing: Sequence[str]) -> str:
     named = [w.removesuffix(": name") for w in chosen if (": " not in w or w.endswith(": name"))]
     swapped = tuple(f"parameter {w.removeprefix('part ')}." for w in named if w.startswith("part "))
     named = [w for w in named if not w.endswith(".seed") and not (swapped and w.startswith(swapped))]
+    named = [*dict.fromkeys("plan" if w.startswith("plan ") else w for w in named)]
     if not named:
         return f"No part, option or parameter differs{', only the seed' if 'seed' in differing else ''}."
     more = f" and {len(named) - MOST} more" if len(named) > MOST else ""

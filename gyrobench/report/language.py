@@ -289,17 +289,19 @@ def reports_there(code: str, system: str, bench: Path | None = None) -> bool:
     return check_code(code) == ENGLISH or catalogue(code, system_folder(system, bench)).reports
 
 
-@contextmanager
-def reports_in(code: str, system: str, bench: Path | None = None) -> Iterator[None]:
-    """Make a language that of the reports written within.
-
-    Raises UsageError for one that there is not, and before anything is run where the test has no texts of its report.
-    """
+def require_reports(code: str, system: str, bench: Path | None = None) -> None:
+    """Raise UsageError for a language that there is not, and for one in which a test has no texts of its report."""
     if not reports_there(code, system, bench):
         raise UsageError(
             f"--language {code}: the report of {system} has no translation, it would be half English; its certificate "
             f"has (gyrobench certificate RUN --language {code})"
         )
+
+
+@contextmanager
+def reports_in(code: str, system: str, bench: Path | None = None) -> Iterator[None]:
+    """Make a language that of the reports written within.  Raises as :func:`require_reports`, before any run."""
+    require_reports(code, system, bench)
     token = _chosen.set(code)
     try:
         yield

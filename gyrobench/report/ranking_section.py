@@ -149,7 +149,7 @@ def _table(doc: Json, path: tuple[str | int, ...], caption: str, letters: Sequen
     columns = [
         Column("rank"),
         Column(""),
-        Column("run", wide=True),
+        Column("name", wide=True),
         *([Column("instrument")] if several else []),
         Column(ranked["name"], unit),
     ]

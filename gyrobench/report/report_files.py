@@ -57,13 +57,20 @@ def write(
 
 def page_in(code: str, report: Report[Any], record: Mapping[str, Any] | None = None, bench: Path | None = None) -> Page:
     """Return the page of a report in another language.  Raises UntranslatedError where it would be half English."""
-    system = report.result.system
-    own, names = own_texts(report)
-    tests = {m.system for m in report.result.suite.members} if isinstance(report.result, SuiteResult) else set()
-    others = [folder for name in sorted(tests) if (folder := system_folder(name, bench))]
-    with used(code, system_folder(system, bench), own, names, others) as language:
-        made = page(report, record)
-        return language.page(made, f"the report of {system}") if language else made
+    return _said(code, [report], lambda: page(report, record), f"the report of {report.result.system}", bench)
+
+
+def _said(
+    code: str, reports: Sequence[Report[Any]], draw: Callable[[], Page], what: str, bench: Path | None, *own: str
+) -> Page:
+    """Return a page of one or several results as :func:`page_in` does; own: texts of the user on it."""
+    texts, names = (set[str]().union(*each) for each in zip(*map(own_texts, reports), strict=True))
+    tests = {m.system for r in reports if isinstance(r.result, SuiteResult) for m in r.result.suite.members}
+    first, *others = dict.fromkeys([*(r.result.system for r in reports), *sorted(tests)])
+    folders = [folder for name in others if (folder := system_folder(name, bench))]
+    with used(code, system_folder(first, bench), {*texts, *own}, names, folders) as language:
+        made = draw()
+        return language.page(made, what) if language else made
 
 
 def own_texts(report: Report[Any]) -> tuple[set[str], set[str]]:
@@ -109,6 +116,7 @@ def compare(
     formats: Sequence[str] = FORMATS,
     baseline: int = 0,
     bench: Path | None = None,
+    language: str = ENGLISH,
 ) -> dict[str, Path]:
     """Write a side-by-side report of named results: ``comparison.json``, ``.html`` and ``.pdf``.
 
@@ -118,7 +126,11 @@ def compare(
     from gyrobench.report import comparison_page
 
     doc = comparison_page.comparison(results, baseline)
-    return write_files(doc, lambda: comparison_page.page(doc), Path(folder), formats, COMPARISON_NAMES, bench)
+    made, own = None, comparison_page.own_texts(doc)
+    if language != ENGLISH and set(formats) != {"json"}:
+        reports = [Report.of(result) for _, result in results]
+        made = _said(language, reports, lambda: comparison_page.page(doc), "the comparison", bench, *own)
+    return write_files(doc, lambda: made or comparison_page.page(doc), Path(folder), formats, COMPARISON_NAMES, bench)
 
 
 def write_files(

@@ -224,7 +224,8 @@ def _with_power(label: str, offset: float, power: int) -> str:
     return axis_label(name, factor if unit == "1" else f"{factor} {unit.removeprefix('(').removesuffix(')')}")
 
 
-def _said(text: str) -> str:
+def said(text: str) -> str:
+    """Return a text in the language of the page."""
     language = in_use()
     return language.text(text) if language else text
 
@@ -321,7 +322,7 @@ def span_labels(ax: Any, spans: Sequence[tuple[float, float, str]]) -> None:
         if k % 2 == 0:
             ax.axvspan(start, end, color=SHADE, linewidth=0, zorder=0)
         text = ax.annotate(
-            _said(label), (0, 1), xycoords="axes fraction", ha="left", va="bottom", color=MUTED, gid=f"spanlabel-{k}"
+            said(label), (0, 1), xycoords="axes fraction", ha="left", va="bottom", color=MUTED, gid=f"spanlabel-{k}"
         )
         size = text.get_window_extent(renderer).width
         left = (0.5 * (start + end) - low) / (high - low) * width - 0.5 * size

@@ -16,6 +16,7 @@ from nicegui import ui
 from nicegui.events import UploadEventArguments
 
 from gyrobench.bench import UsageError, display_path
+from gyrobench.report.language import ENGLISH
 from gyrobench.studio.data_page import FILES, keep
 from gyrobench.studio.frame import CopyLines, Studio, dropped, frame, given_in_address, inside, told
 from gyrobench.studio.request import CommandRequest
@@ -95,7 +96,8 @@ class CommandForm:
             folder = f"{self.under}/{hashlib.sha256(repr(words).encode()).hexdigest()[:8]}"
             words.append(f"--out={display_path(studio.bench.out / folder)}")
         lines = f"import gyrobench as gb\n\nprint(gb.{self.command}({', '.join(arguments)}))"
-        return CommandRequest([*words, *self.fixed], lines, folder, f"/{self.name.lower()}?{urlencode(query)}")
+        fixed = [*self.fixed, *([f"--language={say.code}"] if "--site" in self.fixed and say.code != ENGLISH else [])]
+        return CommandRequest([*words, *fixed], lines, folder, f"/{self.name.lower()}?{urlencode(query)}")
 
 
 SET = FormField("--set", "values", "Other values", "dict", "platform.J=0.7")

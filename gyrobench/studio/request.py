@@ -136,14 +136,15 @@ def read_request(content: dict[str, Any]) -> JobRequest | CommandRequest:
     return CommandRequest(**content) if "words" in content else JobRequest(**content)
 
 
-def comparison_command(runs: list[str]) -> str:
+def comparison_command(runs: list[str], language: str = ENGLISH) -> str:
     """Return the command line that compares folders of runs."""
-    return shlex.join(["gyrobench", "compare", *runs])
+    return shlex.join(["gyrobench", "compare", *runs, *(["--language", language] if language != ENGLISH else [])])
 
 
-def comparison_python(runs: list[str]) -> str:
+def comparison_python(runs: list[str], language: str = ENGLISH) -> str:
     """Return lines of Python that compare folders of runs."""
-    return f"import gyrobench as gb\n\nprint(gb.compare({', '.join(map(repr, runs))}))"
+    written = f"\nfound.write('comparison', language={language!r})" if language != ENGLISH else ""
+    return f"import gyrobench as gb\n\nfound = gb.compare({', '.join(map(repr, runs))})\nprint(found){written}"
 
 
 def first_shown(names: Sequence[str], shown: Sequence[Any]) -> list[str]:

@@ -14,6 +14,7 @@ from nicegui import ui
 from gyrobench.bench import UsageError, display_path
 from gyrobench.reading import visible
 from gyrobench.record.run_document import RunDocument, SuiteDocument, read_run
+from gyrobench.report.language import ENGLISH
 from gyrobench.studio.chart import LiveChart, RecordSignals, SignalChart, signals_of
 from gyrobench.studio.frame import CopyLines, PageSeen, Studio, address, counted, frame, inside, search_field, told
 from gyrobench.studio.job_process import LIVE
@@ -339,8 +340,11 @@ def _add_comparison_page(studio: Studio) -> None:
                 content(found.note).classes("soft")
             shown = [display_path(f) for f in folders]
             target = comparison_folder(folders)
+            systems = {r.system for _, r in found.results}
+            said = {say.of_report(name, studio.bench.folder) for name in systems}
+            language = said.pop() if len(said) == 1 else ENGLISH
             if not studio.read_only:
-                await asyncio.to_thread(found.write, target)
+                await asyncio.to_thread(found.write, target, language=language)
             with ui.element("div").classes("bar"):
                 for place in asked:
                     ui.link(place, address("run", place))
@@ -353,7 +357,7 @@ def _add_comparison_page(studio: Studio) -> None:
                 with ui.tab_panel(made["Signals"]):
                     body = ui.element("div").classes("rows")
                 with ui.tab_panel(made["As a command"]):
-                    CopyLines().show(comparison_command(shown), comparison_python(shown))
+                    CopyLines().show(comparison_command(shown, language), comparison_python(shown, language))
             drawn: list[str] = []
 
             async def opened() -> None:

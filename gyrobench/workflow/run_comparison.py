@@ -13,6 +13,7 @@ from gyrobench.bench import Bench, UsageError
 from gyrobench.boundary import checked
 from gyrobench.notebook import data_frame
 from gyrobench.report import FORMATS, ResultError
+from gyrobench.report.language import ENGLISH, require_reports
 from gyrobench.result import Result
 from gyrobench.workflow.run_folders import short_names
 
@@ -56,11 +57,17 @@ class Comparison:
         return data_frame({key: [row[key] for row in rows] for key in rows[0]}, {})
 
     @checked
-    def write(self, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
-        """Write comparison.json, .html and .pdf into a folder; return their paths."""
+    def write(self, folder: Path, formats: Sequence[str] = FORMATS, language: str = ENGLISH) -> dict[str, Path]:
+        """Write comparison.json, .html and .pdf into a folder; return their paths.
+
+        language: of the pages, en or zh.  Raises UsageError, ReportError.
+        """
         from gyrobench.report import compare
 
-        return compare(self.results, folder, formats, bench=Bench.find().folder)
+        bench = Bench.find().folder
+        for _, result in self.results:
+            require_reports(language, result.system, bench)
+        return compare(self.results, folder, formats, bench=bench, language=language)
 
 
 def compare_results(results: Sequence[tuple[str, Result]]) -> Comparison:

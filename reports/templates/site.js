@@ -7,6 +7,12 @@
   var head = box.querySelector("thead"), body = box.querySelector("tbody"), status = document.getElementById("runs-status");
   var input = document.getElementById("runs-filter"), choice = document.getElementById("runs-columns");
   var pager = box.querySelector(".pager");
+  var words = new Map(Object.entries(table.words || {}));  // English -> the language of the page
+
+  function say(text, values) {
+    var said = words.get(text) || text;
+    return values ? said.replace(/\{(\w+)\}/g, function (_, name) { return values[name]; }) : said;
+  }
   var by = new Map();
   table.columns.forEach(function (c) { by.set(c.key.toLowerCase(), c); });
   var all = Array.from({ length: table.rows }, function (_, k) { return k; });
@@ -55,7 +61,9 @@
 
   function lowered(column) {
     if (!lower.has(column.key)) {
-      lower.set(column.key, column.values.map(function (v) { return v === null ? "" : String(v).toLowerCase(); }));
+      lower.set(column.key, column.values.map(function (v) {
+        return v === null ? "" : (words.has(v) ? v + "\n" + words.get(v) : String(v)).toLowerCase();
+      }));
     }
     return lower.get(column.key);
   }
@@ -77,14 +85,14 @@
       return function (row) { return texts.some(function (t) { return t[row].indexOf(word) >= 0; }); };
     }
     var column = by.get(name.toLowerCase());
-    if (!column) { throw new Error("no column " + name); }
+    if (!column) { throw new Error(say("no column {v}", { v: name })); }
     if (column.kind === "text") {
-      if (sign !== "=" && sign !== "!=") { throw new Error(name + " holds texts: name=text"); }
+      if (sign !== "=" && sign !== "!=") { throw new Error(say("{v} holds texts: name=text", { v: name })); }
       var low = lowered(column), part = wanted.toLowerCase();
       return function (row) { return (low[row].indexOf(part) >= 0) === (sign === "="); };
     }
     var number = +wanted.replace("−", "-");
-    if (wanted === "" || isNaN(number)) { throw new Error(name + ": " + wanted + " is not a number"); }
+    if (wanted === "" || isNaN(number)) { throw new Error(say("{v}: {v2} is not a number", { v: name, v2: wanted })); }
     return compare(column.values, sign, number);
   }
 
@@ -149,7 +157,7 @@
   function cell(column, row) {
     var td = document.createElement("td"), value = text(column, row), mark = null;
     if (column.kind !== "text") { td.className = "n"; }
-    if (value.length > 40) { td.title = value; }
+    if (value.length > 40) { td.title = say(value); }
     if (column.key === "verdict" && /^(pass|fail|inconclusive|void)$/.test(value)) {
       td.className = value;
       mark = document.createElement("span");
@@ -160,10 +168,10 @@
     if (link && (column.key === "index" || column.key === "instrument" || column.key === "verdict")) {
       var a = document.createElement("a");
       a.href = link;
-      a.textContent = value;
-      if (column.key === "index") { a.setAttribute("aria-label", "Report of run " + value); }
+      a.textContent = say(value);
+      if (column.key === "index") { a.setAttribute("aria-label", say("Report of run {n}", { n: value })); }
       (mark ? td.appendChild(mark) : td).append(a);
-    } else { (mark ? td.appendChild(mark) : td).textContent = value; }
+    } else { (mark ? td.appendChild(mark) : td).textContent = say(value); }
     return td;
   }
 
@@ -179,9 +187,10 @@
       part.append(tr);
     }
     body.replaceChildren(part);
-    var count = shown.length ? (first + 1) + " to " + last + " of " + shown.length : "No";
-    status.textContent = (status.dataset.problem ? status.dataset.problem + ". " : "") + count + " runs" +
-      (shown.length < table.rows ? ", filtered from " + table.rows : "") + ".";
+    var count = shown.length ? say("{n} to {n2} of {n3} runs", { n: first + 1, n2: last, n3: shown.length }) :
+      say("No runs");
+    var of = shown.length < table.rows ? say(", filtered from {n}", { n: table.rows }) : "";
+    status.textContent = (status.dataset.problem ? status.dataset.problem + say(". ") : "") + count + of + say(".");
     buttons[0].disabled = buttons[1].disabled = first === 0;
     buttons[2].disabled = buttons[3].disabled = last >= shown.length;
     pager.hidden = shown.length <= PAGE;
@@ -195,13 +204,13 @@
     var button = document.createElement("button");
     button.type = "button";
     button.textContent = b[0];
-    button.setAttribute("aria-label", b[1]);
+    button.setAttribute("aria-label", say(b[1]));
     button.addEventListener("click", function () { b[2](); draw(); });
     pager.append(button);
     return button;
   });
 
-  [["", table.measures.length > 1 ? "all estimates" : "estimate"]].concat(table.measures.map(function (m) { return [m, m]; }))
+  [["", say(table.measures.length > 1 ? "all estimates" : "estimate")]].concat(table.measures.map(function (m) { return [m, m]; }))
     .forEach(function (m) { choice.append(new Option(m[1], m[0])); });
   choice.addEventListener("change", columns);
   var timer = 0;

@@ -14,7 +14,13 @@ from gyrobench.report import language
 from gyrobench.report.language import PLACEHOLDER
 
 ROOT = standard_folder()
-FILES = sorted([*language.FOLDER.glob("*.toml"), *ROOT.glob("systems/*/zh.toml")])
+FILES = sorted(
+    [
+        *language.FOLDER.glob("*.toml"),
+        *ROOT.glob("systems/*/zh.toml"),
+        language.FOLDER.parents[1] / "campaign/site/zh.toml",
+    ]
+)
 LETTERS = re.compile(r"[^\W\d_]+")
 JOINED = re.compile(r"\\n|[\"']\s*[fr]?[\"']")  # a text that goes on in the next line of the code
 LEAST = 8  # runs of four words, of which half are said: fewer are too few to judge

@@ -24,7 +24,13 @@ from gyrobench.report.render import html, pdf
 from gyrobench.report.standard_names import NAMES, names_table
 from gyrobench.result import Reason
 
-FILES = sorted([*language.FOLDER.glob("*.toml"), *standard_folder().glob("systems/*/zh.toml")])
+FILES = sorted(
+    [
+        *language.FOLDER.glob("*.toml"),
+        *standard_folder().glob("systems/*/zh.toml"),
+        language.FOLDER.parents[1] / "campaign/site/zh.toml",
+    ]
+)
 LABORATORY = Laboratory.model_validate({"name": "惯性实验室", "address": ["示例路 1 号"], "language": "zh"})
 OPTION = re.compile(r"\w+ = \"?[\w.]+\"?")  # as it is written: type_b = none
 TEXTS = {

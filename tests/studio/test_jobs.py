@@ -258,3 +258,5 @@ def test_lines_of_a_request() -> None:
     for text in (measured.python(), comparison_python(["a", "b'c"]), request.python(suite=True)):
         compile(text, "lines", "exec")
     assert shlex.split(comparison_command(["a b", "c"])) == ["gyrobench", "compare", "a b", "c"]
+    assert comparison_command(["a", "c"], "zh").endswith("--language zh")
+    assert "language='zh'" in comparison_python(["a", "c"], "zh")

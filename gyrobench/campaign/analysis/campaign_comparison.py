@@ -117,7 +117,7 @@ def _differing(a: measures.Json, b: measures.Json) -> list[measures.Json]:
         x, y = a.get(key), b.get(key)
         if isinstance(x, dict) and isinstance(y, dict):
             names = [n for n in {**x, **y} if x.get(n) != y.get(n)]
-            found += [{"what": f"{key} {n}", "values": [x.get(n), y.get(n)]} for n in names]
+            found += [{"what": f"{key[:-1]} {n}", "values": [x.get(n), y.get(n)]} for n in names]
         elif x != y:
             found.append({"what": key, "values": [x, y]})
     return found

@@ -7,15 +7,38 @@ from typing import Any
 
 from gyrobench.campaign.analysis.campaign_comparison import QUANTITIES
 from gyrobench.campaign.analysis.measures import Json
+from gyrobench.report.language import ENGLISH, used
 from gyrobench.report.numbers import write_p
-from gyrobench.report.page_model import BulletList, Column, Page, PageTable, Row, Section, Text, number_cell, text_cell
+from gyrobench.report.page_model import (
+    BulletList,
+    Cell,
+    Column,
+    Page,
+    PageTable,
+    Row,
+    Section,
+    Text,
+    number_cell,
+    text_cell,
+)
 from gyrobench.report.report_files import COMPARISON_NAMES, write_files
 from gyrobench.report.tables import compact
 
 
-def write_comparison(doc: Json, folder: Path, bench: Path) -> dict[str, Path]:
-    """Write comparison.json, .html and .pdf; return their paths."""
-    return write_files(doc, lambda: page(doc), folder, tuple(COMPARISON_NAMES), COMPARISON_NAMES, bench)
+def write_comparison(doc: Json, folder: Path, bench: Path, language: str = ENGLISH) -> dict[str, Path]:
+    """Write comparison.json, .html and .pdf; return their paths.  Raises UntranslatedError before any page."""
+    named = [(letter, c["name"]) for letter, c in zip("AB", doc["campaigns"], strict=True)]
+    own = {form.format(*n) for n in named for form in ("{1}", "{0}, {1}", "{0} ({1})")}
+    own.add(_title(doc))
+    names = {t["name"] for t in doc["tests"]}.union(*doc["only"])
+    with used(language, Path(__file__).parent, own, names) as words:
+        made = page(doc)
+        made = words.page(made, "the comparison") if words else made
+    return write_files(doc, lambda: made, folder, tuple(COMPARISON_NAMES), COMPARISON_NAMES, bench)
+
+
+def _title(doc: Json) -> str:
+    return ", ".join(c["name"] for c in doc["campaigns"])
 
 
 def page(doc: Json) -> Page:
@@ -31,18 +54,19 @@ def page(doc: Json) -> Page:
         Section("Differing settings", "differs", _settings(doc)),
         Section("Measures", "measures", [_tests(doc), *_only(doc)]),
     ]
-    return Page(f"Comparison: {a['name']}, {b['name']}", doc["report_id"], head, sections).finish()
+    return Page(f"Comparison: {_title(doc)}", doc["report_id"], head, sections).finish()
 
 
 def _settings(doc: Json) -> list[Any]:
     if not doc["differing"]:
         return [Text("No option, part or version differs between the campaigns.")]
-    rows = [
-        Row([text_cell(d["what"]), *(text_cell(v if isinstance(v, str) else compact(v)) for v in d["values"])])
-        for d in doc["differing"]
-    ]
+    rows = [Row([text_cell(d["what"]), *map(_value, d["values"])]) for d in doc["differing"]]
     columns = [Column("setting"), Column("A", wide=True), Column("B", wide=True)]
     return [PageTable(columns, rows, "Options, components and versions that differ.", small=True)]
+
+
+def _value(value: Any) -> Cell:
+    return text_cell("–" if value is None else value if isinstance(value, str) else compact(value), own=True)
 
 
 def _tests(doc: Json) -> PageTable:

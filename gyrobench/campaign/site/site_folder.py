@@ -26,14 +26,21 @@ from gyrobench.bench import Bench, UsageError
 from gyrobench.campaign.analysis.campaign_analysis import analyse
 from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, error, numbers
 from gyrobench.campaign.execution.store import Campaign, CampaignError
-from gyrobench.campaign.site.site_page import page
+from gyrobench.campaign.site.site_page import own_names, own_texts, page, recorded
 from gyrobench.files import write_whole
 from gyrobench.report.assets import read_content
+from gyrobench.report.language import ENGLISH, Language, system_folder, used
 from gyrobench.report.render import html
 from gyrobench.report.result_json import plain
 
 PUBLISHED = ("report.html", "report.pdf", "result.json")
 KEPT = re.compile(r"kept/[\w-]+/report\.html")  # where a campaign keeps the report of a run
+TRANSLATED = ("state", "verdict", "reason")  # columns whose values the page shows in its language
+SCRIPT = (  # texts of site.js
+    "{n} to {n2} of {n3} runs", "No runs", ", filtered from {n}", ". ", ".", "Report of run {n}",
+    "no column {v}", "{v} holds texts: name=text", "{v}: {v2} is not a number",
+    "First page", "Previous page", "Next page", "Last page", "all estimates", "estimate",
+)  # fmt: skip
 DIGITS = 7  # significant digits of the numbers in the table of the page
 
 
@@ -45,12 +52,15 @@ class CampaignSite:
     answer: list[str]
 
 
-def write_site(campaign: Campaign, out: Path | None = None, publish: Path | None = None) -> CampaignSite:
+def write_site(
+    campaign: Campaign, out: Path | None = None, publish: Path | None = None, language: str = ENGLISH
+) -> CampaignSite:
     """Write the site of a campaign, which may be that of others.
 
     out: folder of the site, default ``site`` in the campaign; reports are linked where they are.  publish: a folder
-    that shall hold everything, reports included.  Raises UsageError, and
-    CampaignError for a row whose report is not one of the campaign's.
+    that shall hold everything, reports included.  language: of the page; what runs warn of or failed for stays as it
+    was recorded where it has no translation.  Raises UsageError, and CampaignError for a row whose report is not one of
+    the campaign's.
     """
     if out and publish:
         raise UsageError("out and publish: name one; a published site holds the reports, one of out links them")
@@ -71,13 +81,21 @@ def write_site(campaign: Campaign, out: Path | None = None, publish: Path | None
     measures = CampaignMeasures.of(rows, campaign.units, campaign.axes)
     doc = plain(analyse(campaign))
     bench = Bench.find().folder
+    systems = filter(None, [system_folder(doc["system"], bench)])
+    with used(language, Path(__file__).parent, own_texts(doc), own_names(doc), [*systems]) as words:
+        if words:
+            words.known |= {text: words.find(text) or text for text in recorded(doc)}
+        shown, table = page(doc, measures, link), run_table(measures, link)
+        if words:
+            shown = words.page(shown, "the site")
+            table |= _in_words(table, words)
     files = {
         "analysis.json": json.dumps(doc, indent=1, ensure_ascii=False, allow_nan=False) + "\n",
         "runs.csv": _csv(rows, campaign.units),
-        "runs.js": f"window.gyrobenchRuns = {_script(run_table(measures, link))};\n",
+        "runs.js": f"window.gyrobenchRuns = {_script(table)};\n",
         "site.js": read_content("templates/site.js", bench),
         "site.css": read_content("templates/site.css", bench),
-        "index.html": html(page(doc, measures, link), bench),
+        "index.html": html(shown, bench),
     }
     for name, text in files.items():
         write_whole(folder / name, text.encode())
@@ -180,6 +198,14 @@ def run_table(measures: CampaignMeasures, link: Callable[[str], str]) -> Json:
         add("file", rows["data"])
     links = [link(r) if isinstance(r, str) else "" for r in rows["report"]] if "report" in rows else []
     return {"columns": columns, "measures": measures.names, "links": links, "rows": len(rows)}
+
+
+def _in_words(table: Json, words: Language) -> Json:
+    """Return the columns of a table with their heads in a language, and its words: what the script says, and values."""
+    values = {v for c in table["columns"] if c["key"] in TRANSLATED for v in c["values"]}
+    said = {text: words.find(text) for text in (*SCRIPT, *sorted(values))}
+    columns = [{**c, "head": words.find(c["head"]) or c["head"]} for c in table["columns"]]
+    return {"columns": columns, "words": {text: found for text, found in said.items() if found}}
 
 
 def _reasons(rows: Any) -> list[str]:

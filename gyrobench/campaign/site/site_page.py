@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 from urllib.parse import quote
 
-from gyrobench.campaign.analysis.measures import CampaignMeasures, Json
+from gyrobench.campaign.analysis.measures import SEED_KINDS, CampaignMeasures, Json
 from gyrobench.campaign.site import site_figures, statistics_sections
 from gyrobench.report.numbers import write_number, write_p
 from gyrobench.report.page_model import (
@@ -25,31 +25,41 @@ from gyrobench.report.page_model import (
     text_cell,
 )
 from gyrobench.report.result_json import content_hash
-from gyrobench.report.style import styled
+from gyrobench.report.style import said, styled
 from gyrobench.report.tables import compact
 
 MAX_LISTED = 300  # measurements of a lot listed on the page; the table of runs holds all
 MAX_DRIFTS = 40
 
+#: {0} ...: texts, of which the fourth names the parts between <code>
 RUNS = """<div id="runs-table" hidden>
 <div class="runsbar">
-<label>Filter <input type="search" id="runs-filter" autocomplete="off" spellcheck="false"
- placeholder="state=failed  D_I&gt;0.5  text" aria-describedby="runs-help"></label>
-<label>Columns <select id="runs-columns"></select></label>
+<label>{0} <input type="search" id="runs-filter" autocomplete="off" spellcheck="false"
+ placeholder="state=failed  D_I&gt;0.5  {2}" aria-describedby="runs-help"></label>
+<label>{1} <select id="runs-columns"></select></label>
 </div>
-<p class="quiet" id="runs-help">Words filter all columns; <code>name=text</code>, <code>name&lt;number</code>,
-<code>name&gt;number</code> one of them, <code>u(name)</code> and <code>z(name)</code> too; names with spaces in quotes.
-A heading sorts.</p>
+<p class="quiet" id="runs-help">{3}</p>
 <p id="runs-status" role="status"></p>
-<div class="scroll" tabindex="0" role="group" aria-label="Runs">
+<div class="scroll" tabindex="0" role="group" aria-label="{4}">
 <table id="runs-rows"><thead></thead><tbody></tbody></table>
 </div>
-<div class="pager" role="group" aria-label="Pages of the table"></div>
+<div class="pager" role="group" aria-label="{5}"></div>
 </div>
-<noscript><p>The table needs scripting; its rows are in <a href="runs.csv">runs.csv</a>.</p></noscript>
+<noscript><p>{6}</p></noscript>
 <link rel="stylesheet" href="site.css">
 <script defer src="runs.js"></script>
 <script defer src="site.js"></script>"""
+CODES = [f"<code>{c}</code>" for c in ("name=text", "name&lt;number", "name&gt;number", "u(name)", "z(name)")]
+TEXTS = (
+    "Filter",
+    "Columns",
+    "text",
+    "Words filter all columns; {}, {}, {} one of them, {} and {} too; names with spaces in quotes. A heading "
+    "sorts.".format(*CODES),
+    "Runs",
+    "Pages of the table",
+    'The table needs scripting; its rows are in <a href="runs.csv">runs.csv</a>.',
+)
 
 
 def page(doc: Json, measures: CampaignMeasures, reports: Callable[[str], str]) -> Page:
@@ -65,7 +75,7 @@ def page(doc: Json, measures: CampaignMeasures, reports: Callable[[str], str]) -
             Section("Sobol' indices", "sobol", statistics_sections.sobol_section(doc)),
             Section("Distributions", "distributions", statistics_sections.distributions_section(doc, measures)),
             Section("Runs without result", "failures", _failures(doc)),
-            Section("Runs", "runs", [Markup(RUNS)]),
+            Section("Runs", "runs", [Markup(RUNS.format(*map(said, TEXTS)))]),
             Section("Method and provenance", "method", _method(doc)),
         ]
     identity = content_hash(doc)
@@ -76,6 +86,27 @@ def page(doc: Json, measures: CampaignMeasures, reports: Callable[[str], str]) -
         ("Report", identity),
     ]
     return Page(f"Campaign: {doc['name']}", identity, head, sections).finish()
+
+
+def own_texts(doc: Json) -> set[str]:
+    """Return what is the same in every language: the question, and what files and instruments are called."""
+    listed = doc["lot"]["instruments"] if doc["lot"] else []
+    dates = (d["instrument"] for d in doc["lot"]["changes"]["drifts"]) if doc["lot"] else ()
+    return {doc["question"], doc["name"], doc["system"], *dates, *(i["instrument"] for i in listed)} - {""}
+
+
+def own_names(doc: Json) -> set[str]:
+    """Return names of measures, axes, and of their values."""
+    varied = [a["name"] for a in doc["axes"] if a["kind"] not in (*SEED_KINDS, "data")]
+    levels = {str(v) for axis in doc["responses"] if not axis["numeric"] for v in axis["levels"]}
+    return {*levels, *(d["name"] for d in doc["distributions"]), *varied}
+
+
+def recorded(doc: Json) -> set[str]:
+    """Return what runs warned of and failed for, as the page and its table say it."""
+    lot = doc["lot"] or {"instruments": [], "common": []}
+    found = {f"{w.rstrip('.')}." for i in lot["instruments"] for w in i["why"]} | {c["warning"] for c in lot["common"]}
+    return found | {f["reason"] for f in doc["failures"]}
 
 
 def _answer(doc: Json) -> list[Any]:
@@ -133,7 +164,7 @@ def _instrument(entry: Json, reports: Callable[[str], str], dated: bool, more: l
     return Row(
         [
             text_cell(entry["instrument"], "strong", link),
-            text_cell(_last(entry["data"])),
+            text_cell(_last(entry["data"]), own=True),
             *([text_cell((entry["date"] or "–")[:10])] if dated else []),
             text_cell(verdict, verdict, link),
             *more,
@@ -264,7 +295,8 @@ def _method(doc: Json) -> list[Any]:
     for key, what in (("options", "Fixed options, in SI units"), ("parts", "Components"), ("versions", "Versions")):
         if doc[key]:
             rows = [
-                Row([text_cell(k), text_cell(v if isinstance(v, str) else compact(v))]) for k, v in doc[key].items()
+                Row([text_cell(k, own=True), text_cell(v if isinstance(v, str) else compact(v), own=True)])
+                for k, v in doc[key].items()
             ]
             blocks.append(PageTable([Column("name"), Column("value", wide=True)], rows, f"{what}.", small=True))
     files = "All rows: runs.csv; the numbers of this page: analysis.json."

@@ -135,7 +135,7 @@ def sobol_section(doc: Json) -> list[Any]:
     heads += ["total", "95 % from", "to"] if totals else []
     table = PageTable([Column(h) for h in heads], rows, "Sobol' indices: shares of the variance.", small=True)
     figures = pictures_of(site_figures.indices(sobol["rows"]), "indices")
-    return [*blocks, *figures, CollapsedBlocks(f"PageTable of {len(rows)} indices", [table])]
+    return [*blocks, *figures, CollapsedBlocks(f"Table of {len(rows)} indices", [table])]
 
 
 def distributions_section(doc: Json, measures: CampaignMeasures) -> list[Any]:
