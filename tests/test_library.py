@@ -26,6 +26,7 @@ from gyrobench.engine.session import Session
 from gyrobench.notebook import MissingPackageError
 from gyrobench.result import Coefficient, LoopResult, Reason
 from gyrobench.system.system import System
+from gyrobench.system.values import InvalidValueError
 from gyrobench.workflow.catalog import init_bench
 from gyrobench.workflow.user_errors import PostRunError
 
@@ -357,3 +358,22 @@ def test_a_verdict_is_shown_and_text_is_escaped(run: gb.Run) -> None:
     )  # fmt: skip
     text = shown(evil)
     assert "<b>title</b>" in text and "<i>x</i>" in text and "a < b & c" in text and "</td>" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("gyro.wite", 1.0, "gyro has no parameter 'wite'; nearest: white"),
+        ("gyro.J", "-1 g.cm2", "gyro.J = -1 g.cm2: J must be > 0 kg.m2"),
+        ("gyro.J", "2 kg", "does not convert to 'kg.m2'"),
+        ("gyro.D_B", 3.0, "is an array; give all of it"),
+        ("gyro.mount[1,4]", 1.0, "gyro has no parameter 'mount[1,4]'"),
+    ],
+)
+def test_what_a_part_refuses_is_refused_when_it_is_set(name: str, value: object, words: str) -> None:
+    test = gb.load(NAME, TINY)
+    with pytest.raises(InvalidValueError, match=re.escape(words)):
+        test.set(name, value)
+    assert name not in test.system.overrides
+    test.set("gyro.D_I", "0.9deg/h/g").set("gyro.mount", "[[1,0,0],[0,1,0],[0,0,1]]").set("gyro.reaction", "false")
+    gb.load(NAME, TINY, parts={"gyro": "own.fmu"}).set(name, value)  # what an FMU has is known when it is loaded

@@ -14,7 +14,9 @@ import numpy as np
 
 from gyrobench.bench import Bench, UsageError
 from gyrobench.boundary import checked
+from gyrobench.errors import GyrobenchError
 from gyrobench.notebook import html
+from gyrobench.packaging import load_part
 from gyrobench.reading import shorten
 from gyrobench.record.record import Record
 from gyrobench.report.language import ENGLISH, reports_in
@@ -22,6 +24,7 @@ from gyrobench.report.notebook_html import fragment, paragraph, table_html
 from gyrobench.report.page_model import Column, PageTable, Row, text_cell
 from gyrobench.report.plain_text import align_columns, format_result
 from gyrobench.result import Result
+from gyrobench.system.parameters import refuse_value
 from gyrobench.system.system import System
 from gyrobench.system.values import parse_number
 from gyrobench.units import format_quantity
@@ -142,12 +145,25 @@ class Experiment:
     def set(self, name: str, value: Any) -> Self:
         """Set an option or, as "slot.parameter", a parameter of a part; a number is SI, a text has its unit.
 
-        Returns the experiment.  Raises InvalidValueError; a parameter is checked when its part is known, at the run.
+        Returns the experiment.  Raises InvalidValueError; a parameter of an FMU of others is checked at the run.
         """
+        self._check_parameter(name, value)
         self.system.set(name, value)
         self._given[name] = str(value)
         self._release()
         return self
+
+    def _check_parameter(self, name: str, value: Any) -> None:
+        """Raise InvalidValueError for a value that a part of the bench does not take."""
+        slot, dot, _ = name.partition(".")
+        there = self.system.all_slots()
+        if not dot or name in self.system.options or slot not in there or slot in self.maps:
+            return
+        try:
+            layout = load_part(self.parts.get(slot, there[slot].part), Bench.find().folder).layout
+        except GyrobenchError:  # no part of the bench: it is known when its FMU is loaded
+            return
+        refuse_value(name, value, layout)
 
     @checked
     def run(

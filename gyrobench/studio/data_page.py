@@ -20,7 +20,18 @@ from gyrobench.files import write_whole
 from gyrobench.reading import visible
 from gyrobench.record.column_proposal import FileColumn
 from gyrobench.record.text_cells import cells_of_file
-from gyrobench.studio.frame import CopyLines, Studio, dropped, frame, given_in_address, inside, pairs_in_address, told
+from gyrobench.studio.frame import (
+    FILES,
+    CopyLines,
+    Studio,
+    dropped,
+    frame,
+    given_in_address,
+    inside,
+    pairs_in_address,
+    shown,
+    told,
+)  # fmt: skip
 from gyrobench.studio.request import KEPT, JobRequest
 from gyrobench.studio.words import content, heading, say, spoken
 from gyrobench.system.system import System
@@ -29,7 +40,6 @@ from gyrobench.workflow.gallery import gallery
 from gyrobench.workflow.measured_run import find_faults
 from gyrobench.workflow.user_errors import user_message
 
-FILES = Path("studio", "files")  # below reports/out
 ROWS = 8  # of the preview
 WIDE = 14  # columns of it
 NAME = 80  # characters of the name of a file
@@ -251,7 +261,7 @@ def _mapped(studio: Studio, proposal: ColumnProposal) -> None:
         with faults:
             ui.label(say(head)).classes("small-head")
             for line in lines:
-                content(visible(line)).classes("problem")
+                content(shown(line)).classes("problem")
 
     def lacks() -> None:
         written, problems = mapping.text()
@@ -264,7 +274,7 @@ def _mapped(studio: Studio, proposal: ColumnProposal) -> None:
             assert isinstance(test, System)
             found = await asyncio.to_thread(find_faults, test, proposal.file, request.values, mapping.map_file)
         except Exception as error:
-            listed([user_message(error)], "The file cannot be read so:")
+            listed([user_message(error, at_shell=False)], "The file cannot be read so:")
             return
         listed(found, f"{len(found)} faults:" if found else "Nothing is wrong with the file: it can be reduced.")
 

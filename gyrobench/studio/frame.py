@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import re
+import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from html import escape
@@ -13,13 +15,15 @@ from urllib.parse import quote
 from nicegui import app, ui
 from nicegui.events import Handler, UploadEventArguments
 
-from gyrobench.bench import Bench, UsageError
+from gyrobench.bench import Bench, UsageError, display_path
+from gyrobench.files import TEMPORARY
 from gyrobench.reading import visible
 from gyrobench.studio.gate import UPLOAD
 from gyrobench.studio.jobs import StudioJobs
 from gyrobench.studio.words import NAMES, content, say, spoken
 from gyrobench.workflow.user_errors import user_message
 
+FILES = Path("studio", "files")  # that were dropped, below reports/out
 MARK = "#0b5cad"  # of buttons: white on it is read at 4.5:1 and better
 STYLE = Path(__file__).with_name("studio.css")
 NARROW = Path(__file__).with_name("narrow.js")
@@ -134,9 +138,19 @@ class PageSeen:
         ui.run_javascript(SEEN)
 
 
+def shown(text: str) -> str:
+    """Return what the bench says as a page shows it: files that were dropped by their own names, without the folders
+    that keep them and those of their texts for a while.
+    """
+    out = Bench.find().out
+    kept = "|".join(re.escape(f"{place}{os.sep}{FILES}{os.sep}") + r"\w+" for place in (out, display_path(out)))
+    text_of_log = re.escape(os.path.join(tempfile.gettempdir(), TEMPORARY)) + r"\w+[/\\]\w+"
+    return visible(re.sub(rf"({kept}|{text_of_log})[/\\]", "", text))
+
+
 def show_problem(error: BaseException) -> None:
     """Show the message of an error, as the command prints it but for the advice for a shell."""
-    content(visible(user_message(error, at_shell=False))).classes("problem").props("role=alert")
+    content(shown(user_message(error, at_shell=False))).classes("problem").props("role=alert")
 
 
 def told(action: Callable[[], None]) -> Callable[[], None]:
@@ -146,7 +160,7 @@ def told(action: Callable[[], None]) -> Callable[[], None]:
         try:
             action()
         except Exception as error:
-            words, close = say(visible(user_message(error, at_shell=False))), say("Close")
+            words, close = say(shown(user_message(error, at_shell=False))), say("Close")
             ui.notify(words, type="negative", multi_line=True, close_button=close, timeout=0)
 
     return guarded

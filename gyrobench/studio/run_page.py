@@ -12,11 +12,21 @@ from urllib.parse import quote
 from nicegui import ui
 
 from gyrobench.bench import UsageError, display_path
-from gyrobench.reading import visible
 from gyrobench.record.run_document import RunDocument, SuiteDocument, read_run
 from gyrobench.report.language import ENGLISH
 from gyrobench.studio.chart import LiveChart, RecordSignals, SignalChart, signals_of
-from gyrobench.studio.frame import CopyLines, PageSeen, Studio, address, counted, frame, inside, search_field, told
+from gyrobench.studio.frame import (
+    CopyLines,
+    PageSeen,
+    Studio,
+    address,
+    counted,
+    frame,
+    inside,
+    search_field,
+    shown,
+    told,
+)  # fmt: skip
 from gyrobench.studio.job_process import LIVE
 from gyrobench.studio.jobs import StudioJob
 from gyrobench.studio.picture import MovingPicture
@@ -96,11 +106,11 @@ def _add_job_page(studio: Studio) -> None:
                     return
                 now = studio.jobs.find(key)
                 _show_state(now, state, words, bar)
-                text = visible(now.report.message) or (say("its process was ended") if now.state == "lost" else "")
+                text = shown(now.report.message) or (say("its process was ended") if now.state == "lost" else "")
                 message.set_text(text)
                 goes_on.set_visibility(now.resumable and not studio.read_only)
                 message.set_visibility(bool(message.text))
-                notes.set_text("\n".join(map(visible, now.report.notes)))
+                notes.set_text("\n".join(map(shown, now.report.notes)))
                 notes.classes(add="failed" if now.state == "failed" else "")  # a refusal is read, a table scrolls
                 stop.set_visibility(now.active and not studio.read_only)
                 again.set_visibility(now.resumable and not studio.read_only)
@@ -340,8 +350,7 @@ def _add_comparison_page(studio: Studio) -> None:
                 content(found.note).classes("soft")
             shown = [display_path(f) for f in folders]
             target = comparison_folder(folders)
-            systems = {r.system for _, r in found.results}
-            said = {say.of_report(name, studio.bench.folder) for name in systems}
+            said = {say.of_report(result.system, studio.bench.folder) for _, result in found.results}
             language = said.pop() if len(said) == 1 else ENGLISH
             if not studio.read_only:
                 await asyncio.to_thread(found.write, target, language=language)

@@ -11,9 +11,8 @@ from nicegui.events import UploadEventArguments
 
 from gyrobench.bench import display_path
 from gyrobench.files import write_whole
-from gyrobench.reading import visible
 from gyrobench.studio.data_page import keep
-from gyrobench.studio.frame import Studio, dropped
+from gyrobench.studio.frame import Studio, dropped, shown
 from gyrobench.studio.words import content, say
 from gyrobench.workflow.fit_mapping import write_mapping
 from gyrobench.workflow.user_errors import user_message
@@ -33,7 +32,7 @@ def drop_fmu(studio: Studio, system: str, slot: str, chosen: Callable[[str, str]
             text, problems = await asyncio.to_thread(write_mapping, file, f"{system}.{slot}", None)
         except Exception as error:
             with body:
-                content(visible(user_message(error))).classes("problem").props("role=alert")
+                content(shown(user_message(error, at_shell=False))).classes("problem").props("role=alert")
             return
         mapping = file.with_name(f"{system}.{slot}.toml")
         write_whole(mapping, text.encode())
@@ -47,7 +46,7 @@ def drop_fmu(studio: Studio, system: str, slot: str, chosen: Callable[[str, str]
 def _shown(file: Path, mapping: Path, text: str, problems: list[str]) -> None:
     ui.label(say(f"{file.name}: check names, units and signs; the mapping is kept beside it.")).classes("soft")
     for problem in problems:
-        content(visible(problem)).classes("problem")
+        content(shown(problem)).classes("problem")
     lines = (
         ui.textarea(say("Mapping"), value=text).props("dense outlined autogrow debounce=250").classes("full mapping")
     )

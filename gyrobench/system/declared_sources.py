@@ -25,6 +25,17 @@ def take_sources(system: type[System], reduction: type) -> None:
     system.assumed = (*system.assumed, *sorted(new))
 
 
+def misnamed_sources(system: System) -> list[str]:
+    """Return what a system's option corrections names that no test has: a run would end in that refusal."""
+    text = str(system.values.get("corrections", ""))
+    if not text or not system.reduction:
+        return []
+    from gyrobench.reduction.estimation.effects import unknown_sources
+
+    system.reduction_object()  # declares the sources of its own
+    return unknown_sources(text)
+
+
 def require_options(system: System, reduction: Any, module: str) -> None:
     """Raise UsageError where a reduction, loaded late from its module, states a source that is no option."""
     for name, source in declared(reduction).items():

@@ -7,11 +7,13 @@ import difflib
 import functools
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gyrobench import units
+from gyrobench.component.declarations import Scalar
 from gyrobench.errors import GyrobenchError
+from gyrobench.reading import shorten
 from gyrobench.system.bare_numbers import question, usual_size
 from gyrobench.system.binding import Binding, Bound
 from gyrobench.system.part_values import PartValues
@@ -103,26 +105,42 @@ def followed(assembly: Assembly, system: System) -> set[str]:
 
 def _override(name: str, value: Any, binding: Binding, base: Mapping[str, Any]) -> dict[str, Any]:
     """Elements and SI values of one "slot.parameter" as given by the user.  Raises InvalidValueError."""
-    slot, _, parameter = name.partition(".")
-    text = value
-    if isinstance(value, str) and value.strip().startswith("["):
-        value = parse(name, value)
-    found = {}
-    for element, v in flatten(parameter, value).items():
+    slot, found = name.partition(".")[0], {}
+    for element, v in _elements(name, value).items():
         bound = _target(element, binding)
         if bound is None:
-            names = list(binding.parameters)
-            if any(n.startswith(parameter + "[") for n in names) and element == parameter:
-                raise InvalidValueError(
-                    f"{name}: is an array; give all of it as [a, b, ...] or one element {parameter}[1]"
-                )
-            near = difflib.get_close_matches(element, names, n=4, cutoff=0.3) or names[:12]
-            raise InvalidValueError(f"{name}: {slot} has no parameter '{element}'; nearest: {', '.join(near)}")
+            raise _no_parameter(name, element, list(binding.parameters))
         given = found[f"{slot}.{element}"] = _si(f"{slot}.{element}", v, bound)
         if bound.kind == "Real" and bound.unit:
             usual = _usual(slot, element, bound, binding, base)
-            question(f"{slot}.{element}", text, given, _si_unit(bound.unit), usual)
+            question(f"{slot}.{element}", value, given, _si_unit(bound.unit), usual)
     return found
+
+
+def _elements(name: str, value: Any) -> dict[str, Any]:
+    """Return the elements of a value as it is given for "slot.parameter"; a list may be text."""
+    given = parse(name, value) if isinstance(value, str) and value.strip().startswith("[") else value
+    return flatten(name.partition(".")[2], given)
+
+
+def _no_parameter(name: str, element: str, names: list[str]) -> InvalidValueError:
+    slot, _, parameter = name.partition(".")
+    if any(n.startswith(parameter + "[") for n in names) and element == parameter:
+        return InvalidValueError(f"{name}: is an array; give all of it as [a, b, ...] or one element {parameter}[1]")
+    near = difflib.get_close_matches(element, names, n=4, cutoff=0.3) or names[:12]
+    return InvalidValueError(f"{name}: {slot} has no parameter '{element}'; nearest: {', '.join(near)}")
+
+
+def refuse_value(name: str, value: Any, layout: Sequence[Scalar]) -> None:
+    """Raise InvalidValueError for a "slot.parameter" that a part of this layout lacks, or a value out of its bounds."""
+    known = {s.name: s.decl for s in layout if s.section in ("parameter", "input")}
+    for element, v in _elements(name, value).items():
+        if (decl := known.get(element)) is None:
+            raise _no_parameter(name, element, [s.name for s in layout if s.section == "parameter"])
+        given = parse(f"{name.partition('.')[0]}.{element}", v, _si_unit(decl.unit), decl.type)
+        if bound := decl.bound_broken(given):
+            unit = "" if decl.unit == "1" else f" {decl.unit}"
+            raise InvalidValueError(f"{name} = {shorten(str(value))}: {element} must be {bound}{unit}")
 
 
 def resolve(

@@ -369,8 +369,10 @@ class System(Configurable):
 
     def refuse(self) -> None:
         """Raises InvalidConfigurationError when the plan or the values are impossible."""
+        from gyrobench.system.declared_sources import misnamed_sources
+
         plan = self.plan()
-        problems = (plan.problems() if plan.phases else []) + list(self.check())
+        problems = [*(plan.problems() if plan.phases else []), *self.check(), *misnamed_sources(self)]
         if not (length := plan.duration()) < 1e12 * self.step:  # weeks at a million a second
             problems.append(f"{length:.3g} s in steps of {self.step:.3g} s: more than 1e+12 steps")
         if problems:
@@ -378,10 +380,7 @@ class System(Configurable):
 
     def flat_parameters(self, parts: PartValues) -> dict[str, Any]:
         """Return :meth:`parameters` element by element: {"sequencer.mode[1]": 2, ...}."""
-        found: dict[str, Any] = {}
-        for name, value in self.parameters(parts).items():
-            found.update(flatten(name, value))
-        return found
+        return {k: v for name, value in self.parameters(parts).items() for k, v in flatten(name, value).items()}
 
 
 def _without(wires: str, lines: str) -> str:

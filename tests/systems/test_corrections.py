@@ -18,6 +18,7 @@ from gyrobench.engine.session import Session
 from gyrobench.record.record import Record
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Result
+from gyrobench.system.configurable import InvalidConfigurationError
 from gyrobench.system.system import load_system
 
 NAME = "tumble_single_axis"
@@ -128,3 +129,17 @@ def test_refused(session: Session, text: str, words: str) -> None:
     record = session.run(values, seed=1)
     with pytest.raises(ReductionError, match=re.escape(words)):
         corrected(record, text)
+
+
+def test_a_source_that_no_test_has_is_refused_before_the_run() -> None:
+    """By name, by the name of a part, by id; all of a test pass, of which some belong to another one."""
+    stated = {"table axis off the polle, about east": "table axis off the pole, about east",
+              "angle error, once a turn (sin)": "angle error, once a turn (sine)",
+              "torquer.scale": "torquer scale factor"}  # fmt: skip
+    for source, meant in stated.items():
+        with pytest.raises(
+            InvalidConfigurationError, match=re.escape(f"no source '{source}'; meant is perhaps '{meant}'")
+        ):
+            load_system(NAME).with_values({"corrections": f"{source} = 1(1) arcsec"}).refuse()
+    known = [*(source for _, source, _ in TUMBLE), "angle.once.sine", "torquer.scale_factor", "latitude"]
+    load_system(NAME).with_values({"corrections": "; ".join(f"{source} = 1(1)" for source in known)}).refuse()

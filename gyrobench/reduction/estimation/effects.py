@@ -26,7 +26,7 @@ from gyrobench.reading import shorten
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import without
 from gyrobench.reduction.setup.run_metadata import Remount
-from gyrobench.reduction.setup.sources import RELATIVE, REMOUNT, Effect
+from gyrobench.reduction.setup.sources import KNOWN, RELATIVE, REMOUNT, Effect
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Table
 
@@ -83,6 +83,20 @@ def misstated(text: str) -> str:
     return f"corrections: '{shorten(wrong[0].strip())}' is not of the form {FORM}" if wrong else ""
 
 
+def unknown_sources(text: str) -> list[str]:
+    """Return what is wrong with the sources that an option corrections names, as far as it is known before a run:
+    those that no declared source is called.  Which of the others a test has its data tell.
+    """
+    stated = [" ".join(one.rpartition("=")[0].split()) for one in text.split(";") if one.strip()]
+    names = [f"{s.name} ({part})" if part else s.name for s in KNOWN.values() for part in s.parts or ("",)]
+    return [_no_source(n, names) for n in stated if not any(s.names(n) for s in KNOWN.values())]
+
+
+def _no_source(source: str, known: Iterable[str]) -> str:
+    near = difflib.get_close_matches(source, list(known), 1, 0.4)
+    return f"corrections: no source '{source}'" + (f"; meant is perhaps '{near[0]}'" if near else "")
+
+
 def _corrections(effects: Sequence[Effect], text: str, elsewhere: Sequence[str]) -> list[Correction]:
     if not text.strip():
         return []
@@ -102,9 +116,7 @@ def _read(text: str, unit: Mapping[str, str], by_id: Mapping[str, str]) -> Corre
         raise ReductionError(f"corrections: '{shorten(text)}' is not of the form {FORM}")
     source = by_id.get(match["source"], match["source"])
     if source not in unit:
-        near = difflib.get_close_matches(source, unit, 1, 0.4)
-        meant = f"; meant is perhaps '{near[0]}'" if near else ""
-        raise ReductionError(f"corrections: no source '{source}'{meant}; this test has: {'; '.join(unit)}")
+        raise ReductionError(f"{_no_source(source, unit)}; this test has: {'; '.join(unit)}")
     try:
         given = [units.parse_quantity(f"{match[k]}{match['unit']}", unit[source]) for k in ("value", "u")]
     except ValueError as error:

@@ -27,6 +27,7 @@ The way of a statement ``--set u_axis=60arcsec``:
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -45,6 +46,8 @@ PHASES = ("phase 0°", "phase 90°")  # of a wobble
 #: unit of a source that is relative to the reading (scale factor, nonlinearity, time base): its error holds the noise
 #: of the data, which a covariance would take for information about it
 RELATIVE = "1"
+#: (id, name) -> every source that a module which is loaded declares
+KNOWN: dict[tuple[str, str], Source] = {}
 STATED = "positive where the stated one is too large"
 
 
@@ -69,6 +72,15 @@ class Source:
     doc: str = ""
     default: float | str = 0.0
     parameter: str = ""
+
+    def __post_init__(self) -> None:
+        KNOWN[self.id, self.name] = self
+
+    def names(self, text: str) -> bool:
+        """Return whether a text is a name or an id of it, of one that is alike, or of a part of it."""
+        ends = "|".join(map(re.escape, self.parts)) or ".+"
+        forms = {self.name: rf"(, .+)?( \(({ends})\))?", self.id: r"(\..+)?"}
+        return any(re.fullmatch(re.sub(r"\\{\w+\\}", ".+", re.escape(n)) + end, text) for n, end in forms.items())
 
     def of(self, **named: str) -> Source:
         """Return one of several sources that are alike: its fields filled in."""
