@@ -305,3 +305,19 @@ def test_characters_that_turn_the_direction_of_a_text_are_shown(tmp_path: Path) 
     for name in ("index.html", "runs.js"):
         page = (tmp_path / "site" / name).read_text(encoding="utf-8")
         assert "a⟨U+202E⟩liaf" in page and "\u202e" not in page and "\x1b" not in page, name
+
+
+def test_no_file_of_a_site_has_the_folders_of_the_machine(tmp_path: Path) -> None:
+    """Measured files by their places in the folder that holds all of them, files of a definition by their names."""
+    machine = "/home/someone/Prüf stand/los"
+    columns = {"data": [f"{machine}/{k % 2}/{k}.csv" for k in range(9)], "state": ["done"] * 8 + ["refused"]}
+    columns["reason"] = [None] * 8 + [f"{machine}/0/8.csv: not usable"]
+    columns["warnings"] = [[f"{machine}/{k % 2}/{k}.csv has an odd row."] for k in range(9)]
+    columns |= synthetic.measure("D_F", np.arange(9.0), 1.0)
+    more = {"axes": [{"name": "data", "kind": "data", "unit": ""}], "options": {"profile": f"{machine}/ride.csv"}}
+    written = write_site(Campaign.open(synthetic.write(tmp_path / "c", columns, {}, **more)))
+    files = {f.name: f.read_text(encoding="utf-8") for f in written.index.parent.iterdir()}
+    assert len(files) == 6 and not [name for name, text in files.items() if "someone" in text]
+    assert '"0/8.csv"' in files["runs.js"] and "0/8.csv: not usable" in files["index.html"]
+    assert "ride.csv" in files["index.html"] and "\n1,,synthetic,1,1/1.csv," not in files["runs.csv"]
+    assert "1/1.csv has an odd row." in files["runs.csv"]

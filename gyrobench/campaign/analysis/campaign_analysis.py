@@ -12,6 +12,7 @@ from gyrobench.campaign.analysis.axis_effects import main_effects, responses
 from gyrobench.campaign.analysis.coverage_counts import coverage
 from gyrobench.campaign.analysis.lots import analyse_lot
 from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, numbers
+from gyrobench.campaign.analysis.places import names_alone, without_folders
 from gyrobench.campaign.analysis.sobol_indices import sobol_indices
 from gyrobench.report.numbers import write_number
 
@@ -25,8 +26,11 @@ PERCENTILES = {"min": 0.0, "q025": 2.5, "median": 50.0, "q975": 97.5, "max": 100
 
 
 def analyse(campaign: Campaign) -> Json:
-    """Return the analysis of a stored campaign: states, distributions, coverage, responses, indices, lot, failures."""
-    rows = campaign.table()
+    """Return the analysis of a stored campaign: states, distributions, coverage, responses, indices, lot, failures.
+
+    Files are called as a site does (:mod:`.places`).
+    """
+    rows = without_folders(campaign.table())
     measures = CampaignMeasures.of(rows, campaign.units, campaign.axes)
     definition = campaign.definition
     doc: Json = {
@@ -36,8 +40,8 @@ def analyse(campaign: Campaign) -> Json:
         "system": str(definition.get("system") or definition.get("suite") or ""),
         "created_with": definition.get("created_with"),
         "versions": definition.get("versions") or {},
-        "parts": definition.get("parts") or {},
-        "options": definition.get("options") or {},
+        "parts": names_alone(definition.get("parts") or {}),
+        "options": names_alone(definition.get("options") or {}),
         "axes": [_axis(axis, rows) for axis in campaign.axes],
         "runs": len(rows),
         "states": _counts(rows["state"]),

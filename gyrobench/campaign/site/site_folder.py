@@ -25,6 +25,7 @@ from gyrobench import reading
 from gyrobench.bench import Bench, UsageError
 from gyrobench.campaign.analysis.campaign_analysis import analyse
 from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, error, numbers
+from gyrobench.campaign.analysis.places import without_folders
 from gyrobench.campaign.execution.store import Campaign, CampaignError
 from gyrobench.campaign.site.site_page import own_names, own_texts, page, recorded
 from gyrobench.files import write_whole
@@ -69,7 +70,7 @@ def write_site(
         raise UsageError(f"{campaign.url}: not a folder of this machine; say where the site goes: --publish DIR")
     _require_own(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    rows = campaign.table()
+    rows = without_folders(campaign.table())
     kept = sorted({r for r in rows["report"].dropna()}) if "report" in rows else []
     if outside := [r for r in kept if not KEPT.fullmatch(r)]:
         raise CampaignError(
