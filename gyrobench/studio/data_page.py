@@ -165,13 +165,17 @@ def _preview(mapping: _Mapping) -> None:
 
 
 def _columns(mapping: _Mapping) -> None:
-    """Add a row for each column of the test: which of the file it is, its unit, its sign."""
+    """Add a row for each column of the test: which of the file it is, its unit, its sign; of a record of any columns
+    without names, one for each of the file, too.
+    """
     columns = mapping.proposal.layout.columns
     names = {}
     for k, c in enumerate(columns):
         name = " + ".join(map(str, c.sources)) if len(c.sources) > 1 else c.name  # a date and a clock time
         names[k] = f"{name} [{c.unit or c.written}]" if c.unit or c.written else name
-    for name in dict.fromkeys([*mapping.proposal.wanted, *mapping.proposal.found]):
+    any_names = not mapping.proposal.layout.names and "channel" in mapping.proposal.test.options
+    free = [c.name for c in columns if any_names]  # what they are is said by their units
+    for name in dict.fromkeys([*mapping.proposal.wanted, *mapping.proposal.found, *free]):
         wanted = mapping.proposal.wanted.get(name, "")
         with ui.element("div").classes("setting mapped"):
             with ui.element("div").classes("about"):

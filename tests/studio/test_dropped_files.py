@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
+from studio_pages import CHROMIUM, NONE, base_of
 from studio_requests import Door
 
 from gyrobench.bench import Bench
@@ -40,3 +42,28 @@ def test_no_page_of_a_dropped_file_has_its_folder(studio: tuple[str, Path]) -> N
         (files / name).write_bytes(content)
         answer = door.get(f"/data?file=0123456789ab/{name}&test=fixed_position")[2].decode()
         assert said in answer and str(files) not in answer and f"{FILES}/0123456789ab/{name}: " not in answer
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason=NONE)
+@pytest.mark.long
+def test_each_column_without_a_name_may_be_a_channel_of_a_drift_record(page: Any, studio: tuple[str, Path]) -> None:
+    """One is the rate; another, by its unit, a second one, and a third the temperature; the fourth is left out."""
+    files = studio[1] / "reports" / "out" / FILES / "00000000000a"
+    files.mkdir(parents=True)
+    rows = [f"{0.01 * k:.2f},{k % 7},{k % 5},{20 + k % 3},{k % 2}\n" for k in range(400)]
+    (files / "bare.csv").write_text("".join(rows), encoding="utf-8")
+    page.goto(base_of(studio) + "/data?file=00000000000a/bare.csv&test=drift_record")
+    for name, unit in (("rate", "deg/s"), ("column_3", "deg/s"), ("column_4", "degC")):
+        page.get_by_label(f"column for {name}", exact=True).click()
+        chosen = "column_2" if name == "rate" else name
+        page.get_by_role("option", name=chosen, exact=True).click()
+        page.get_by_label(f"unit of {name}", exact=True).fill(unit)
+    page.get_by_label("unit of time", exact=True).fill("s")
+    page.get_by_role("button", name="Check the file").click()
+    page.get_by_text("Nothing is wrong with the file").wait_for()
+    text = (files / "drift_record.toml").read_text(encoding="utf-8")
+    assert (
+        '[columns.column_3]\nfrom = 3\nunit = "deg/s"' in text and '[columns.column_4]\nfrom = 4\nunit = "degC"' in text
+    )
+    assert "[columns.column_5]" not in text
+    assert page.get_by_label("column for column_5", exact=True).count() == 1

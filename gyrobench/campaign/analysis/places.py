@@ -1,4 +1,4 @@
-"""Paths of a user's machine, which a site does not print: files by their places in the folder that holds all of them."""
+"""Paths of a machine, which a site does not print: files by their places in the folder that holds all of them."""
 
 from __future__ import annotations
 
