@@ -13,7 +13,7 @@ from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.reported import Group
-from gyrobench.reduction.estimation.sentences import Sentence, plus_minus, told
+from gyrobench.reduction.estimation.sentences import Sentence, plain, plus_minus, told
 from gyrobench.reduction.setup.run_metadata import Location, number, truth_of
 from gyrobench.reduction.setup.setups import RebalanceSetup, Setup, SiteSetup, attitude_of
 from gyrobench.reduction.setup.sources import Effect, Source
@@ -23,6 +23,6 @@ from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 __all__ = [
     "Account", "Array", "Candidate", "Coefficient", "DriftReduction", "DriftTestResult", "Effect", "Findings", "Group",
     "Location", "Quantity", "Reason", "RebalanceSetup", "Record", "ReductionError", "Regression", "RunDocument",
-    "Sentence", "Setup", "SiteSetup", "Source", "Table", "attitude_of", "number", "plus_minus", "told", "truth_of",
-    "window_problems",
+    "Sentence", "Setup", "SiteSetup", "Source", "Table", "attitude_of", "number", "plain", "plus_minus", "told",
+    "truth_of", "window_problems",
 ]  # fmt: skip

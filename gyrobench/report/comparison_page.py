@@ -121,7 +121,9 @@ def _facts(result: Result) -> dict[str, Any]:
     run = plain(result.provenance)
     facts: dict[str, Any] = {"system": result.system, "instrument": result.instrument, "method": result.method}
     facts |= {f"site {k}": plain(v) for k, v in result.site.items()}
-    facts |= {k: run.get(k) for k in ("seed", "step", "engine", "order", "operator", "date") if run.get(k) is not None}
+    facts |= {k: run[k] for k in ("seed", "step", "engine") if run.get(k) is not None}
+    facts |= {"execution order": run["order"]} if run.get("order") is not None else {}
+    facts |= {k: run[k] for k in ("operator", "date") if run.get(k) is not None}
     for slot, part in (run.get("parts") or {}).items():
         items = part.items() if isinstance(part, dict) else [("name", part)]
         facts |= {f"part {slot}: {k}": v for k, v in items}

@@ -31,7 +31,7 @@ from gyrobench.studio.frame import (
     pairs_in_address,
     shown,
     told,
-)  # fmt: skip
+)
 from gyrobench.studio.request import KEPT, JobRequest
 from gyrobench.studio.words import content, heading, say, spoken
 from gyrobench.system.system import System

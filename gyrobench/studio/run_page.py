@@ -26,7 +26,7 @@ from gyrobench.studio.frame import (
     search_field,
     shown,
     told,
-)  # fmt: skip
+)
 from gyrobench.studio.job_process import LIVE
 from gyrobench.studio.jobs import StudioJob
 from gyrobench.studio.picture import MovingPicture

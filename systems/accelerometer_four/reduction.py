@@ -22,6 +22,7 @@ import numpy as np
 from gyrobench import frames
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup.sources import GRAVITY, VOLTMETER, Effect
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
 from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Location, Quantity, Setup, told
@@ -91,7 +92,7 @@ class Reduction(DriftReduction[FourSetup]):
         scale = self.single[:, 1]
         if np.any(scale <= 0.0):
             raise ReductionError(
-                f"scale factors {', '.join(f'{k:.4g}' for k in scale)} V/g: must be positive; turn the sign of a "
+                f"scale factors {', '.join(f'{plain(k, 4)}' for k in scale)} V/g: must be positive; turn the sign of a "
                 "voltage round, or the sense of the angle, or sensors stand in another order"
             )
         first = joint(self.alpha, self.U, self.setup, scale).fit()
@@ -142,7 +143,7 @@ class Reduction(DriftReduction[FourSetup]):
         scale = float(np.mean(self.joint.est.beta[1:20:5]))
         text = (
             f"The first harmonic of the head is not known: {', '.join(BIASED)} of each sensor are biased by K_I D1, "
-            f"{scale * ARCSEC:.2g} V for each arcsecond; the residuals do not show it. Measure it in the same "
+            f"{plain(scale * ARCSEC)} V for each arcsecond; the residuals do not show it. Measure it in the same "
             "positions."
         )
         names = tuple(f"{k},{i}" for i, k in NAMES if k in BIASED)
@@ -155,11 +156,11 @@ class Reduction(DriftReduction[FourSetup]):
             three = three + _first_harmonic(beta[1:20:5], s.D1)
         each = zip(NAMES, beta[:20], u[:20], three.ravel(), self.single.ravel(), strict=True)
         rows = [[f"{k},{i}", *map(float, values), MEANING[k][1]] for (i, k), *values in each]
-        scatter = ", ".join(f"{v:.3g}" for v in self.s_single)
+        scatter = ", ".join(plain(v, 3) for v in self.s_single)
         caption = (
             "Chain: D4 and higher, D2, D3 taken out one after the other, corrected by EA3 to EA5, same D1. "
             f"Alone: five terms of each sensor, errors of the head in them. Residuals of the sensors alone: {scatter} "
-            f"V, of the joint fit {self.joint.residual_std:.3g} V."
+            f"V, of the joint fit {plain(self.joint.residual_std, 3)} V."
         )
         head = ["coefficient", "joint", "u, type A", "chain", "alone", "unit"]
         return Table("fits.compared", "Joint fit, chain of the source, each sensor alone", caption, head, rows)
@@ -181,7 +182,7 @@ class Reduction(DriftReduction[FourSetup]):
         scatter, dof = self.joint.residual_std, self.joint.dof
         return [
             *told(coefficients, f"Scale factors: {scales}."),
-            f"Residual standard deviation {scatter:.3g} V with {dof:.0f} degrees of freedom.",
+            f"Residual standard deviation {plain(scatter, 3)} V with {dof:.0f} degrees of freedom.",
         ]
 
 
@@ -221,12 +222,12 @@ def _position_problems(alpha: Array, end: Array, points: int) -> list[str]:
     off = np.flatnonzero((np.abs(alpha - number * step) > POSITION) | (np.abs(end - alpha) > POSITION))
     if off.size:
         a, b = (math.degrees(float(x[off[0]])) for x in (alpha, end))
-        return [f"row {off[0] + 1}: {a:.6g}° to {b:.6g}° is not one of {points} equally spaced positions"]
+        return [f"row {off[0] + 1}: {plain(a, 6)}° to {plain(b, 6)}° is not one of {points} equally spaced positions"]
     counts = np.bincount(np.mod(number, points).astype(int), minlength=points)
     if np.any(counts != counts[0]) or counts[0] == 0:
         few = int(np.argmin(counts))
-        where = math.degrees(few * step)
-        return [f"position {where:.4g}° is read {counts[few]} times, others {counts.max()}: whole turns are needed"]
+        where = plain(math.degrees(few * step), 4)
+        return [f"position {where}° is read {counts[few]} times, others {counts.max()}: whole turns are needed"]
     return [] if 16 <= points <= 24 else [f"points = {points}: 16 to 24 positions"]
 
 

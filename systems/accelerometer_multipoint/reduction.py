@@ -28,7 +28,7 @@ from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.setup.run_metadata import Location, number, phases, truth_of
 from gyrobench.reduction.setup.setups import weighed
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Effect, Findings, Group, Quantity, told
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Effect, Findings, Group, Quantity, plain, told
 from gyrobench.result import Coefficient, DriftTestResult, Harmonic, Reason, Table
 from gyrobench.units import ARCSEC
 
@@ -213,7 +213,7 @@ class Reduction(DriftReduction[MultipointSetup]):
             conventions=[
                 "X, Y, Z = −f/g0 along input, output and pendulum axis (sign of Hu 1981: an axis that points up reads "
                 "−γ); g0 = 9.80665 m/s². Against +f/g0 k1 and k3 change sign; k0, k2, k4, k5 do not.",
-                f"k are multiples of g0 with λ = {s.scale / G0 * 1e-3:.9g} g0/mA; γ = g/g0 = {s.gamma:.7f}.",
+                f"k are multiples of g0 with λ = {plain(s.scale / G0 * 1e-3, 9)} g0/mA; γ = g/g0 = {s.gamma:.7f}.",
                 "θ counts from where the input axis is level, in the sense in which it rises; θ₀ is the zero of the "
                 "head and the error of the input axis together, which no multi-position test separates.",
                 "All readings of one visit of a position are one datum.",

@@ -12,8 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import special
 
-from gyrobench.arrays import Array
-from gyrobench.result import Reason
+from gyrobench.reduction.toolkit import Array, Reason, plain
 from gyrobench.units import ARCSEC
 
 from .readings import FIRST, MEANS, POSITIONS, TURNED
@@ -49,9 +48,9 @@ def drifting(X: Array, y: Array, weights: Array, kind: Sequence[str], t: Array) 
             break
         size = (-2.0 if k == POSITIONS else 2.0) * change / ARCSEC  # its rows are first less second
         text = (
-            f"{WHAT[k]}, by {size:+.2g}″ from the first position to the last. Low harmonics hold part of it where the "
-            "positions follow one another around the turn. Wait until the temperature is even, or go to the positions "
-            "in an irregular order."
+            f"{WHAT[k]}, by {plain(size, 2, '+')}″ from the first position to the last. Low harmonics hold part of it "
+            "where the positions follow one another around the turn. Wait until the temperature is even, or go to the "
+            "positions in an irregular order."
         )
         found.append(Reason("readings.drift", text.replace("-", "−"), ("pass", "fail"), severity="doubt"))
         terms = np.hstack([terms, columns])

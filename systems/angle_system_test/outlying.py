@@ -12,8 +12,7 @@ import math
 import numpy as np
 from scipy import special
 
-from gyrobench.arrays import Array
-from gyrobench.result import Reason
+from gyrobench.reduction.toolkit import Array, Reason, plain
 from gyrobench.units import ARCSEC
 
 LEVEL = 1e-3  # probability that any row of a clean record of normal noise is named
@@ -39,7 +38,7 @@ def outlying(X: Array, y: Array, weights: Array, angle: Array) -> list[Reason]:
     if not far:
         return []
     apart = (y - X @ np.linalg.lstsq(A[keep], z[keep], rcond=None)[0]) / ARCSEC
-    at = {f"{math.degrees(angle[k]) % 360.0:.2f}°": f"{apart[k]:+.3g}″" for k in sorted(far, reverse=True)}
+    at = {f"{math.degrees(angle[k]) % 360.0:.2f}°": f"{plain(apart[k], 3, '+')}″" for k in sorted(far, reverse=True)}
     listed = ", ".join(f"{place} ({off})" for place, off in list(at.items())[:LISTED]).replace("-", "−")
     more = f" and {len(at) - LISTED} more" if len(at) > LISTED else ""
     text = (

@@ -17,6 +17,7 @@ import numpy as np
 
 from gyrobench import frames
 from gyrobench.reduction.estimation.findings import NORMAL_RESIDUALS, Findings
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.reduction.toolkit import Account, DriftReduction, Effect, Group, Quantity, Regression, RunDocument, told
 from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
@@ -97,7 +98,7 @@ class Reduction(DriftReduction[AngleSystemSetup]):
             equation='r = theta + E(theta) - dot(theta) tau, quad E = sum_k a_k cos k theta + b_k sin k theta, '
             'quad r - r_2 = E(theta) - E(theta + delta)',
             conventions=[
-                f"The scale is read a second time {second}, at θ + {math.degrees(a.head):.6g}°.",
+                f"The scale is read a second time {second}, at θ + {plain(math.degrees(a.head), 6)}°.",
                 "Errors are reading minus angle; constants cannot be told from the zeros and are left out.",
                 "Each reading counts at the instant that its time stamp states.",
             ],
@@ -206,9 +207,9 @@ class Reduction(DriftReduction[AngleSystemSetup]):
             found.append(Reason("reader.lost", text))
         if mixed := ", ".join(str(k) for k in a.causes if k not in a.orders):
             text = (
-                f"Not estimable for the reader: order {mixed}. Two readings {math.degrees(a.head):.6g}° apart have "
-                "nearly the same error there; only the difference to the reference is estimated, and rate readouts are "
-                "not evaluated. Take another head angle."
+                f"Not estimable for the reader: order {mixed}. Two readings {plain(math.degrees(a.head), 6)}° apart "
+                "have nearly the same error there; only the difference to the reference is estimated, and rate "
+                "readouts are not evaluated. Take another head angle."
             )
             found.append(Reason("reader.not_separated", text))
         return found

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.spatial.transform import Rotation
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.estimator_metrics import lasting_squares
 from gyrobench.reduction.loops.estimator_result import consistency_test
 from gyrobench.reduction.loops.loop_curves import over_time, thinned
@@ -83,7 +84,7 @@ class Reduction(LoopReduction):
         """Return an rms with its interval: "0.0302° (rms; 95 %: 0.024 to 0.041)"."""
         c = self.found[name]
         unit = c.unit if c.unit == "°" else f" {c.unit}"
-        return f"{c.estimate:.3g}{unit} (rms; 95 %: {c.interval[0]:.2g} to {c.interval[1]:.2g})"
+        return f"{plain(c.estimate, 3)}{unit} (rms; 95 %: {plain(c.interval[0])} to {plain(c.interval[1])})"
 
     def _size(self, name: str, meaning: str, x: Array, most: float = math.inf, unit: str = "°") -> None:
         """Measure the rms of the length of vectors (n, axes); u of as many independent squares as the series hold.
@@ -124,7 +125,7 @@ class Reduction(LoopReduction):
         seeks = f"mean 1 where the stated covariance is right; {nu:.0f} independent squares"
         wrong = consistency_test(self.found, name, value, 1.0, p, p >= LEVEL, seeks, what)
         calm = " and ".join(CALM)
-        text = f"{name} = {value:.3g} instead of 1. {wrong.capitalize()}. Its model does not hold in {calm}."
+        text = f"{name} = {plain(value, 3)} instead of 1. {wrong.capitalize()}. Its model does not hold in {calm}."
         self.found.warn(f"estimator.consistency:{name}", text if wrong else "")
 
     def _phases(self) -> Table:

@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis.handling_candidates import exchanged_columns, exchanged_rows, other_times
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
 from gyrobench.reduction.diagnosis.stated_motion import SEVERITY, first_departure
-from gyrobench.result import Reason
+from gyrobench.reduction.toolkit import Array, Reason, Record, plain
 
 from .closed import AXES, cone_rate
 
@@ -46,9 +44,10 @@ def other_chain(setup: ConingSetup, cones: Cones, windows: Mapping[str, Array]) 
     k, drift, far = off
     rate, stated = motions[k]
     text = (
-        f"At {cones.cones[k][0]:g} Hz the attitude drifts by {drift / rate:.3g} of ω (1 − cos θ), the stated filter, "
-        f"output rate and algorithm make {stated / rate:.3g}. Are frequency (Hz, not rad/s), half-angle (not the full "
-        "angle) and drift in the units that are given, and interval, bandwidth, coning and samples those of the unit?"
+        f"At {cones.cones[k][0]:g} Hz the attitude drifts by {plain(drift / rate, 3)} of ω (1 − cos θ), the stated "
+        f"filter, output rate and algorithm make {plain(stated / rate, 3)}. Are frequency (Hz, not rad/s), half-angle "
+        "(not the full angle) and drift in the units that are given, and interval, bandwidth, coning and samples "
+        "those of the unit?"
     )
     blocked, severity = SEVERITY[far]
     yield Reason("coning.stated", text.replace(" -", " −"), blocked, severity=severity)
@@ -67,16 +66,17 @@ def implausible(setup: ConingSetup, cones: Cones, windows: Mapping[str, Array]) 
         stated = float(setup.chain.drift(f, theta, own)[own]) / rate
         if abs(drift[own]) > MORE * abs(rate) + noise:
             text = (
-                f"At {f:g} Hz the attitude drifts by {drift[own] / rate:.3g} of ω (1 − cos θ), more than without any "
-                "coning terms. Are frequency (Hz, not rad/s or per minute), half-angle (not the full angle) and drift "
-                "in the units that are given?"
+                f"At {f:g} Hz the attitude drifts by {plain(drift[own] / rate, 3)} of ω (1 − cos θ), more than without "
+                "any coning terms. Are frequency (Hz, not rad/s or per minute), half-angle (not the full angle) and "
+                "drift in the units that are given?"
             )
         elif drift[own] / rate > PART and abs(drift[own]) > 2.0 * noise:
             if stated > -PART:
                 continue
             text = (
-                f"At {f:g} Hz the attitude drifts with the cone, by {drift[own] / rate:.3g} of ω (1 − cos θ); coning "
-                "that is not computed makes it drift against it. Is the sense of the cones, or of the drift, reversed?"
+                f"At {f:g} Hz the attitude drifts with the cone, by {plain(drift[own] / rate, 3)} of ω (1 − cos θ); "
+                "coning that is not computed makes it drift against it. Is the sense of the cones, or of the drift, "
+                "reversed?"
             )
         elif np.max(np.abs(np.delete(drift, own))) > max(
             ACROSS * abs(drift[own]), PART * abs(rate), 2.0 * noise

@@ -29,7 +29,7 @@ from gyrobench.reduction.setup.run_metadata import with_plan
 from gyrobench.reduction.setup.setups import Setup, weighed
 from gyrobench.reduction.setup.sources import TIME_BASE, TURNED, Effect
 from gyrobench.reduction.setup.window_checks import window_problems
-from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Record, told
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Record, plain, told
 from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import DEG, DPH
 
@@ -74,7 +74,7 @@ class Cones:
     def names(self, axis: str) -> list[str]:
         """Return the coefficients along an axis: d_z(5 Hz), with the half-angle where a frequency has several."""
         alone = len({f for f, _ in self.cones}) == len(self.cones)
-        angles = ["" if alone else f", {theta / DEG:.4g}°" for _, theta in self.cones]
+        angles = ["" if alone else f", {plain(theta / DEG, 4)}°" for _, theta in self.cones]
         return [f"d_{axis}({hertz(f)}{a})" for (f, _), a in zip(self.cones, angles, strict=True)]
 
 
@@ -91,7 +91,7 @@ class ConingAxis(DriftReduction[ConingSetup]):
         truth, own = s.truth or {}, AXES.index(self.axis)
         quantities = [Quantity.of(f"b_{self.axis}", f"drift along {self.axis} at rest", "deg/h", truth.get("b"))]
         for name, (f, theta) in zip(c.names(self.axis), c.cones, strict=True):
-            meaning = f"drift along {self.axis} by coning at {hertz(f)}, half-angle {theta / DEG:.4g}°"
+            meaning = f"drift along {self.axis} by coning at {hertz(f)}, half-angle {plain(theta / DEG, 4)}°"
             quantities.append(Quantity.of(name, meaning, "deg/h", truth.get(name)))
         X = np.column_stack([np.ones(number.size), *(number == k for k in range(len(c.cones)))]).astype(float)
         t0, t1 = (np.asarray(self.windows[n], dtype=float) for n in ("t_start", "t_end"))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from gyrobench.reduction.estimation.sentences import p_text
+from gyrobench.reduction.estimation.sentences import p_text, plain
 from gyrobench.reduction.loops.estimator_metrics import UncertainValue
 from gyrobench.reduction.loops.estimator_result import consistency_test
 from gyrobench.reduction.loops.loop_reduction import MeasureReduction
@@ -55,8 +55,8 @@ class Reduction(MeasureReduction):
         self._size("torquer", "rms rate by the torquer", parts["compensator.u"], None, "°/h")
         share = float(np.mean(parts["compensator.saturated"])) if "compensator.saturated" in parts else 0.0
         text = (
-            f"The torquer is at its limit in {100.0 * share:.3g} % of the readings. There the drift is not compensated "
-            "and the closed forms do not apply. Raise u_max or trim the constant drift."
+            f"The torquer is at its limit in {plain(100.0 * share, 3)} % of the readings. There the drift is not "
+            "compensated and the closed forms do not apply. Raise u_max or trim the constant drift."
         )
         found.warn("torquer.limit", text if share > 0.0 else "")
         self._consistency(half)
@@ -102,8 +102,8 @@ class Reduction(MeasureReduction):
         seeks = f"mean {wanted:g} where the stated covariance is right"
         wrong = consistency_test(self.found, name, v.value, wanted, p, p >= ENOUGH, seeks, what)
         text = (
-            f"{name} = {v.value:.3g} instead of {wanted:g}, {p_text(p)}. {wrong.capitalize()}. Its model of drift, "
-            "table or torquer is not the one of the table."
+            f"{name} = {plain(v.value, 3)} instead of {wanted:g}, {p_text(p)}. {wrong.capitalize()}. Its model of "
+            "drift, table or torquer is not the one of the table."
         )
         self.found.warn(f"estimator.consistency:{name}", text if wrong else "")
 

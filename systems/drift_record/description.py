@@ -12,13 +12,12 @@ import numpy as np
 from gyrobench import units
 from gyrobench.record import sampling
 from gyrobench.record.drift_columns import ANGLE, DIRECT, FORCE, VELOCITY, harmonic_names
-from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.channel_units import ChannelUnits, units_of
 from gyrobench.reduction.series.deviations import Deviation
 from gyrobench.reduction.series.noise_coefficients import slopes
 from gyrobench.reduction.series.quantization import folded
-from gyrobench.result import Reason, Table
+from gyrobench.reduction.toolkit import Reason, RunDocument, Table, plain
 from gyrobench.units import ARCSEC
 
 from . import noise_tables
@@ -94,9 +93,9 @@ def acquisition_texts(p: Prepared, run: RunDocument) -> list[str]:
         )
     elif not run.series["samples"] and not run.options.get("bandwidth") and _flat(p, run):
         out.append(
-            f"The spectrum is flat to half the sampling rate of {1.0 / run.series['acquisition']['step']:.3g} Hz. That "
-            "of point samples of a faster signal is too: if they are points, N holds what is folded. To say what they "
-            "are: '# samples = means', or '# bandwidth = ...Hz'."
+            f"The spectrum is flat to half the sampling rate of {plain(1.0 / run.series['acquisition']['step'], 3)} "
+            "Hz. That of point samples of a faster signal is too: if they are points, N holds what is folded. To say "
+            "what they are: '# samples = means', or '# bandwidth = ...Hz'."
         )
     return out
 
@@ -192,7 +191,7 @@ def explained_text(p: Prepared) -> str:
     if p.clean is p.rate or left > NOTHING * of:
         return ""
     return (
-        f"Lines or other columns explain all of the rate but {left / of:.1g} of its standard deviation: the "
+        f"Lines or other columns explain all of the rate but {plain(left / of, 1)} of its standard deviation: the "
         "coefficients are those of what is left of it by rounding."
     )
 
@@ -245,7 +244,7 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
     if about and about["jitter"] > 0.01 and not about["rounded"]:
         say(
             "jitter",
-            f"The time stamps are off an even grid by {100.0 * about['jitter']:.2g} % of a step, rms. Spectrum and "
+            f"The time stamps are off an even grid by {plain(100.0 * about['jitter'])} % of a step, rms. Spectrum and "
             "models take the samples as even. Sample by a clock, or resample.",
         )
     if saturated := saturated_text(p, run):
@@ -262,8 +261,9 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
     if about and bandwidth and not means and (excess := folded(about["step"], bandwidth)).ratio > 1.0:
         say(
             "folded",
-            f"Point samples every {about['step']:.3g} s of a signal of {bandwidth:.3g} Hz alias: N² is up to "
-            f"{excess.decibels:.2g} dB too large. Sample every {excess.longest:.2g} s or faster, or take means.",
+            f"Point samples every {plain(about['step'], 3)} s of a signal of {plain(bandwidth, 3)} Hz alias: N² is up "
+            f"to {plain(excess.decibels)} dB too large. Sample every {plain(excess.longest)} s or faster, or take "
+            "means.",
         )
     return out
 

@@ -11,7 +11,7 @@ from gyrobench.reduction.series.autoregression import Autoregression
 from gyrobench.reduction.series.channel_units import ChannelUnits
 from gyrobench.reduction.series.drift_model import DriftModel
 from gyrobench.reduction.series.stationarity import RunsTest
-from gyrobench.result import Table
+from gyrobench.reduction.toolkit import Table, plain
 
 from .noise_tables import number
 
@@ -75,7 +75,7 @@ def models(m: DriftModel, units: ChannelUnits) -> list[Table]:
             "least",
         ]
         tables.append(
-            Table("orders", "Order of the autoregression", f"Burg, of means over {m.model_dt:.4g} s", head, rows)
+            Table("orders", "Order of the autoregression", f"Burg, of means over {plain(m.model_dt, 4)} s", head, rows)
         )
     if m.burg is not None:
         walker = m.yule_walker if m.yule_walker is not None else np.full(m.burg.phi.size, np.nan)

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.agreement import ENOUGH
 from gyrobench.reduction.noise_model.constancy import changing
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.channel_units import ChannelUnits
 from gyrobench.reduction.series.noise_coefficients import Estimate
+from gyrobench.reduction.toolkit import Array, Table, plain
 from gyrobench.report.numbers import write_number, write_p
-from gyrobench.result import Table
 
 EVEN, SWING = 1e-6, 0.1  # probability and size of a change of the noise level from which on it is said
 CHANGED = {"white": "white noise behind its filter", "readout": "white noise of the reading",
@@ -78,7 +77,7 @@ def _disagreement(noise: NoiseModel) -> str:
 
 
 def _percent(x: float) -> str:
-    return f"{100.0 * x:.3g} %"
+    return f"{plain(100.0 * x, 3)} %"
 
 
 def agreement_text(noise: NoiseModel) -> str:
@@ -177,9 +176,9 @@ def gauss_markov(noise: NoiseModel, units: ChannelUnits) -> list[Table]:
             "finding"]  # fmt: skip
     caption = (
         "dx/dt = −x/τ + w with variance σ² and two-sided density q = 2 σ²/τ of w; at the rate of the record, every "
-        f"{noise.scale.tau0:.4g} s, x(k+1) = φ x(k) + w(k). A filter takes all of them: the model has them all. The "
-        "intervals hold for every likely number of processes: one may stand for several, then τ is of any of them with "
-        "a quarter of their variance, σ of all within the interval of τ together"
+        f"{plain(noise.scale.tau0, 4)} s, x(k+1) = φ x(k) + w(k). A filter takes all of them: the model has them all. "
+        "The intervals hold for every likely number of processes: one may stand for several, then τ is of any of them "
+        "with a quarter of their variance, σ of all within the interval of τ together"
     )
     return [Table("gauss_markov", "Gauss-Markov processes", caption, head, rows)] if rows else []
 

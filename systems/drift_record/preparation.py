@@ -11,8 +11,6 @@ from typing import Any
 import numpy as np
 
 from gyrobench import frames
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
 from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.channel_units import FORCE, RATE, ChannelUnits, units_of
@@ -21,8 +19,7 @@ from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.lines import Lines
 from gyrobench.reduction.series.row_pattern import RowPattern, every_second_row
 from gyrobench.reduction.setup import run_metadata
-from gyrobench.reduction.setup.setups import attitude_of
-from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.reduction.toolkit import Array, Record, ReductionError, attitude_of, plain
 from gyrobench.units import DPH
 
 from .regressors import RegressionSlope, regress, with_rates_of_change
@@ -118,18 +115,19 @@ def columns_of(record: Record) -> Columns:
     grid = step * np.arange(float(len(w["mean"])))
     if run.options.get("reading") == "force":
         known = float(attitude_of(run)[0] @ frames.U) * site.gravity
-        said = [f"Specific force of the axis x, mean of a window, less that of gravity along it, {known:.6g} m/s²."]
+        along = plain(known, 6)
+        said = [f"Specific force of the axis x, mean of a window, less that of gravity along it, {along} m/s²."]
         bias = {"bias": np.asarray(w["mean"], dtype=float) - known}
         return Columns(grid, bias, others, run.window_units, step, said, {"bias": FORCE})
     k = run_metadata.rate_per_reading(run)
     input_rate = float(attitude_of(run)[0] @ frames.earth_rate_local(site.latitude, site.earth_rate))
     rate = input_rate - k * np.asarray(w["mean"], dtype=float)
-    earth = f"Earth rate along the input axis {input_rate / DPH:.6g} °/h."
+    earth = f"Earth rate along the input axis {plain(input_rate / DPH, 6)} °/h."
     said = [
         f"Drift rate ω_IA less the mean rate of a window, axis x: the sign of a precession. {earth}"
         if run_metadata.reads_rate(run)
         else "Drift rate ω_d = ω_IA − k i in precession sign, k i the mean current of a window in rate; "
-        f"k = {k * 1e-3 / DPH:.6g} °/h/mA, {earth}"
+        f"k = {plain(k * 1e-3 / DPH, 6)} °/h/mA, {earth}"
     ]
     return Columns(grid, {"drift": rate}, others, run.window_units, step, said)
 

@@ -21,8 +21,6 @@ from typing import Any
 import numpy as np
 
 from gyrobench.record.drift_columns import DIRECT
-from gyrobench.record.record import Record
-from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.channel_correlation import whitened
@@ -32,7 +30,7 @@ from gyrobench.reduction.series.noise_coefficients import Estimate
 from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.reduction.series.smoothing import smooth_drift
 from gyrobench.reduction.setup import run_metadata
-from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.reduction.toolkit import Record, ReductionError, RunDocument, plain
 from gyrobench.result import Coefficient, DriftColumn, DriftRecordResult, Reason, Table
 from gyrobench.result_entries import (
     DeviationCurve,
@@ -189,7 +187,7 @@ def _stated(
     if not a.noise.agrees:
         why, low, high = noise_tables.contradicted(a.noise), math.nan, math.nan
     elif why and bound:
-        why = f"{why}; below {max(abs(low), abs(high)):.2g} {unit} (95 %)"
+        why = f"{why}; below {plain(max(abs(low), abs(high)))} {unit} (95 %)"
     if why:
         return Coefficient(name, meaning, unit, math.nan, math.nan, NORMAL, (low, high), truth=true, no_value=why)
     u_a = (high - low) / (2.0 * NORMAL)

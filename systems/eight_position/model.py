@@ -26,14 +26,10 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench import frames, units
-from gyrobench.arrays import Array
 from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.estimation import regression
-from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.reported import Estimates
-from gyrobench.reduction.setup.setups import SiteSetup
-from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.reduction.toolkit import Array, Findings, Quantity, ReductionError, SiteSetup, plain
 
 from . import positions
 
@@ -123,8 +119,8 @@ def linear(channel: str, current: Array, d: Array, setup: EightPositionSetup) ->
     k0, start = 1.0 / float(beta[0]), beta[1:] / float(beta[0])
     if k0 < 0.0:
         raise ReductionError(
-            f"k_{channel} = {k0:.6g} rad/s/A is negative: positive current must precess positively; turn the sign of "
-            f"the {channel} current round (or the positions {a} and {b} are exchanged)"
+            f"k_{channel} = {plain(k0, 6)} rad/s/A is negative: positive current must precess positively; turn the "
+            f"sign of the {channel} current round (or the positions {a} and {b} are exchanged)"
         )
     predicted = (w - D @ start) / k0
     return LinearCurrent(k0, start, np.column_stack([predicted, D]), w - k0 * current)

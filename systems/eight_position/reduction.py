@@ -31,7 +31,7 @@ from gyrobench.reduction.estimation.repeatability import reduce_days
 from gyrobench.reduction.setup.run_metadata import phases, truth_of
 from gyrobench.reduction.setup.sources import LATITUDE, TURNED, Effect, Source
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.reduction.toolkit import Account, Array, Candidate, DriftReduction, Findings, Group, Record, told
+from gyrobench.reduction.toolkit import Account, Array, Candidate, DriftReduction, Findings, Group, Record, plain, told
 from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import DPH
 
@@ -114,7 +114,7 @@ class CurrentChannel(DriftReduction[EightPositionSetup]):
         full = float(np.max(np.abs(current))) or 1.0
         offset = found.error(-lin.k0)
         _, nonlinearity, zero, resolution = drift_terms.torquer_sources(
-            c, f"{full * 1e3:.3g} mA"
+            c, f"{plain(full * 1e3, 3)} mA"
         )  # the scale factor is a result
         parts = tuple(f"position {n} about {axis}" for axis in turns for n in np.unique(position))
         return [
@@ -143,8 +143,8 @@ class CurrentChannel(DriftReduction[EightPositionSetup]):
         if abs(k) < 3.0 * u:
             a, b = ALONE[c]
             raise ReductionError(
-                f"I_{c}{a} = I_{c}{b} within the noise: no scale factor k_{c} (relative uncertainty {u / abs(k):.2g}); "
-                "longer readings or a lower latitude are needed"
+                f"I_{c}{a} = I_{c}{b} within the noise: no scale factor k_{c} (relative uncertainty "
+                f"{plain(u / abs(k))}); longer readings or a lower latitude are needed"
             )
         return super().finished(found, self.all_effects(found))
 

@@ -39,7 +39,7 @@ from gyrobench.reduction.setup.sources import (
     Effect,
 )
 from gyrobench.reduction.setup.window_checks import window_problems
-from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Record, told
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Record, plain, told
 from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import DPH
 
@@ -169,9 +169,11 @@ class Reduction(DriftReduction[FixedPositionSetup]):
         torque = abs(s.k * float(np.mean(self.current)))
         walk = found.residual_std * math.sqrt(float(np.mean(self.t1 - self.t0)) / 3600.0)
         if torque > MOST * s.earth_rate:
-            said = f"The torquer holds {torque / DPH:.3g} °/h at rest, {torque / s.earth_rate:.3g} times the Earth rate"
+            rate, times = plain(torque / DPH, 3), plain(torque / s.earth_rate, 3)
+            said = f"The torquer holds {rate} °/h at rest, {times} times the Earth rate"
         elif walk < QUIETEST:
-            said = f"The readings scatter as an angle random walk of {walk:.1g} °/√h does, less than that of any gyro"
+            walks = f"an angle random walk of {plain(walk, 1)} °/√h"
+            said = f"The readings scatter as {walks} does, less than that of any gyro"
         else:
             return []
         text = f"{said}. Is the current in the unit that is given (mA, not A), and k the scale factor of this torquer?"
@@ -230,13 +232,14 @@ def _trend(found: Findings, middle: Array) -> tuple[float, float] | None:
 
 
 def _conventions(s: FixedPositionSetup) -> list[str]:
-    axes = "; ".join(f"{n} = ({', '.join(f'{v:.6g}' for v in row)})" for n, row in zip("IOS", s.attitude, strict=True))
+    rows = zip("IOS", s.attitude, strict=True)
+    axes = "; ".join(f"{n} = ({', '.join(plain(v, 6) for v in row)})" for n, row in rows)
     return [
         "Drift ω_d in precession sign; the rate ω_g of axis x (input axis) is ω_IA − ω_d."
         if s.rate
         else "Drift ω_d in precession sign; k i = ω_IA − ω_d, positive current precesses positively.",
         f"Attitude, in east, north, up: {axes}.",
-        *([] if s.rate else [f"k = {s.k * 1e-3 / DPH:.6g} °/h/mA."]),
+        *([] if s.rate else [f"k = {plain(s.k * 1e-3 / DPH, 6)} °/h/mA."]),
         "One attitude gives one number: no separation of constant, g and g² terms.",
     ]
 

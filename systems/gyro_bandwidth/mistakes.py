@@ -10,7 +10,7 @@ import numpy as np
 
 from gyrobench.reduction.diagnosis.scale_mistakes import AMPLITUDES, factor_sentence
 from gyrobench.reduction.loops.response_errors import ROUNDING
-from gyrobench.result import Reason
+from gyrobench.reduction.toolkit import Reason, plain
 
 from .response import Figures, GyroResponse, curves, fitted
 
@@ -40,7 +40,7 @@ def mistakes(r: GyroResponse, found: Figures) -> Iterator[Reason]:
             return
     if math.cos(phase) < -0.5:
         text = (
-            f"The phase at low frequency is {math.degrees(phase):.3g}°. The sense of the gyro or of the table is "
+            f"The phase at low frequency is {plain(math.degrees(phase), 3)}°. The sense of the gyro or of the table is "
             "reversed. Check which sense is positive."
         )
         yield Reason("response.sense", text.replace("-", "−"), blocked, severity="doubt")
@@ -88,11 +88,12 @@ def _rows(r: GyroResponse, found: Figures) -> Iterator[Reason]:
         again = fitted(replace(r, gain=gain, phase=phase), c.poles, c.p if c.resonant else None)
         if again is not None and again.chi2 < BETTER * found.curve.chi2:
             a, b = sorted((float(r.f[i]), float(r.f[j])))
-            text = f"The points at {a:.4g} Hz and {b:.4g} Hz seem exchanged: the curve then fits. Check these rows."
+            points = f"The points at {plain(a, 4)} Hz and {plain(b, 4)} Hz"
+            text = f"{points} seem exchanged: the curve then fits. Check these rows."
             yield Reason("response.exchanged", text, ("pass", "fail"), severity="doubt")
             return
     text = (
-        f"The point at {float(r.f[worst[0]]):.4g} Hz is {off[worst[0]]:.2g} standard deviations off the curve. Check "
-        "it; u of all figures is widened."
+        f"The point at {plain(float(r.f[worst[0]]), 4)} Hz is {plain(off[worst[0]])} standard deviations off the "
+        "curve. Check it; u of all figures is widened."
     )
     yield Reason("response.outlier", text)

@@ -17,7 +17,7 @@ from gyrobench.reduction.loops.loop_curves import bode, curve
 from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table, told
 from gyrobench.reduction.loops.response_errors import GAIN_SLOPE, Sensitivity, not_stated, predicted_shifts
 from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG, TIME_BASE, Source
-from gyrobench.result import Reason
+from gyrobench.reduction.toolkit import Reason, plain
 from gyrobench.units import DEG
 
 from .mistakes import mistakes
@@ -37,7 +37,7 @@ PLAIN = 1e-9  # Hz; finer than any figure
 STEPS = (1e-3, 1e-5, 1e-3, 1e-3)  # of the sources, of which the sensitivities are taken
 CLEAR, EARLY = 5.0, 0.01  # u, and of the delay, from which on a negative delay beside the poles is said
 NEAR = 2.0  # steps of the frequencies from a resonance, within which a crossing rests on the model
-NOT_REACHED = "not reached up to {f:.4g} Hz, the highest frequency"
+NOT_REACHED = "not reached up to {f} Hz, the highest frequency"
 
 
 class Reduction(MeasureReduction):
@@ -66,7 +66,7 @@ class Reduction(MeasureReduction):
             conventions=[
                 "Gain and phase: rate indicated over rate of the table as read; a lag is negative.",
                 f"Curve: {self._curve_named()}, of the least Bayesian information criterion.",
-                f"Table rate: amplitude {least:.4g} to {most:.4g} °/s.",
+                f"Table rate: amplitude {plain(least, 4)} to {plain(most, 4)} °/s.",
                 *_sampled(points),
                 self._delayed(),
             ],
@@ -90,7 +90,7 @@ class Reduction(MeasureReduction):
         for k, (name, meaning, unit, scale) in enumerate(FIGURES):
             value = float(self.figures.value[k])
             if not math.isfinite(value):
-                found.measure(name, meaning, unit, None, no_value=NOT_REACHED.format(f=highest))
+                found.measure(name, meaning, unit, None, no_value=NOT_REACHED.format(f=plain(highest, 4)))
                 continue
             u = math.hypot(float(self.figures.u[k]), *(s.share(k) for s in by))
             true = float(truth[k]) if truth is not None and math.isfinite(truth[k]) else None
@@ -117,7 +117,7 @@ class Reduction(MeasureReduction):
 
     def _curve_named(self) -> str:
         c = self.figures.curve
-        more = f", a delay and a resonance at {c.resonance:.4g} Hz" if c.resonant else " and a delay"
+        more = f", a delay and a resonance at {plain(c.resonance, 4)} Hz" if c.resonant else " and a delay"
         return f"{c.poles} pole{'s' * (c.poles != 1)}{more}"
 
     def _pure_delay(self) -> tuple[float, float]:
@@ -128,10 +128,10 @@ class Reduction(MeasureReduction):
     def _delayed(self) -> str:
         T, u = (x * 1e3 for x in self._pure_delay())
         held = self.response.held * 1e3
-        samples = f", {T / held:.3g} samples of the gyro" if held else ""
+        samples = f", {plain(T / held, 3)} samples of the gyro" if held else ""
         return (
-            f"{T:.3g} ms of the delay (u = {u:.2g} ms{samples}) are no pole's, whose gain would show: the gyro's own, "
-            "or those of a late reading."
+            f"{plain(T, 3)} ms of the delay (u = {plain(u)} ms{samples}) are no pole's, whose gain would show: the "
+            "gyro's own, or those of a late reading."
         ).replace("-", "−")
 
     def _table(self) -> Table:
@@ -182,13 +182,13 @@ class Reduction(MeasureReduction):
     def _doubts(self) -> None:
         found, points, c = self.found, self.points, self.figures.curve
         if points.saturated:
-            at = ", ".join(f"{f:.3g} Hz" for f in points.saturated)
+            at = ", ".join(f"{plain(f, 3)} Hz" for f in points.saturated)
             found.doubt("gyro.saturated", f"The gyro was beyond its range at {at}. Its gain there is too small. Take a "
                                           "smaller rate.")  # fmt: skip
         if points.known and c.chi2 > c.dof + 4.0 * math.sqrt(2.0 * c.dof):
             text = (
-                f"The curve does not fit the points: χ² = {c.chi2:.3g} of {c.dof} degrees of freedom. u of the figures "
-                "is widened by its root. The gyro has a response of another shape, or points are wrong."
+                f"The curve does not fit the points: χ² = {plain(c.chi2, 3)} of {c.dof} degrees of freedom. u of the "
+                "figures is widened by its root. The gyro has a response of another shape, or points are wrong."
             )
             found.doubt("response.misfit", text)
         elif not points.known and self._neighbours_alike():
@@ -201,8 +201,9 @@ class Reduction(MeasureReduction):
         early = -T
         if self.run.measured and early > max(CLEAR * u, EARLY * float(self.figures.value[3])):
             text = (
-                f"The phase lags by {early * 1e3:.3g} ms less than the gain makes it (u = {u * 1e3:.2g} ms), as zeros "
-                "of the gyro may do, or an amplitude that is wrong at high frequencies, or a late reading of the table."
+                f"The phase lags by {plain(early * 1e3, 3)} ms less than the gain makes it (u = {plain(u * 1e3)} ms), "
+                "as zeros of the gyro may do, or an amplitude that is wrong at high frequencies, or a late reading of "
+                "the table."
             )
             found.warn("response.early", text)
         peak = float(np.max(self.response.gain) - math.log(self.figures.value[0]))
@@ -210,7 +211,8 @@ class Reduction(MeasureReduction):
             top = float(self.response.f[int(np.argmax(self.response.gain))])
             rise = 20.0 * peak / math.log(10.0)
             more = "Measure more frequencies there."
-            found.warn("response.resonance", f"The gain rises to {rise:.3g} dB at {top:.3g} Hz: a resonance. {more}")
+            text = f"The gain rises to {plain(rise, 3)} dB at {plain(top, 3)} Hz: a resonance. {more}"
+            found.warn("response.resonance", text)
         if c.resonant:
             step = float(np.max(np.diff(np.log(points.f))))
             f3, f90 = (
@@ -218,8 +220,8 @@ class Reduction(MeasureReduction):
             )  # no NaN is
             names = (*(("f_3dB", "order") if f3 else ()), *(("f_90",) if f90 else ()))
             text = (
-                f"What the response does between the points, about the resonance at {c.resonance:.4g} Hz, decides on "
-                f"{', '.join(names)}. Measure more frequencies there."
+                f"What the response does between the points, about the resonance at {plain(c.resonance, 4)} Hz, "
+                f"decides on {', '.join(names)}. Measure more frequencies there."
             )
             found.reasons += [Reason("response.between", text, ("pass", "fail"), names, severity="doubt")] * bool(names)
 
@@ -229,10 +231,10 @@ def _sampled(points: Points) -> list[str]:
     if not points.held:
         return []
     found = [
-        f"The gyro gives a sample each {points.held * 1e3:.4g} ms; sines are fitted to the samples at their own times, "
-        "and the curve is times that of a sample held until the next one."
+        f"The gyro gives a sample each {plain(points.held * 1e3, 4)} ms; sines are fitted to the samples at their own "
+        "times, and the curve is times that of a sample held until the next one."
     ]
     if points.folded:
-        at = ", ".join(f"{f:.4g} Hz" for f in points.folded)
+        at = ", ".join(f"{plain(f, 4)} Hz" for f in points.folded)
         found.append(f"Left out: {at}, near a multiple of half the output rate, where a sine and its image are one.")
     return found

@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import integrate
 
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
 from gyrobench.reduction.loops.loop_measures import Gate, gates
 from gyrobench.reduction.loops.response_errors import line_ratios
-from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.reduction.toolkit import Array, Record, ReductionError, plain
 
 from .model import AngleResponse
 from .steps import LEAST, TableTurn, turns_of
@@ -99,6 +97,6 @@ def _checked(f: Array, value: NDArray[Any], u: Array, table: Array, output: bool
     if not (np.all(f > 0.0) and np.all(np.abs(value) > 0.0) and np.all(np.isfinite(value))):
         raise ReductionError("frequencies and amplitudes must be above 0")
     if f.min() < SLOWEST or f.max() > FASTEST:
-        raise ReductionError(f"frequencies from {f.min():.3g} to {f.max():.3g} Hz: is their unit right?")
+        raise ReductionError(f"frequencies from {plain(f.min(), 3)} to {plain(f.max(), 3)} Hz: is their unit right?")
     order = np.argsort(f)
     return ShakenPoints(AngleResponse(f[order], value[order], u[order], output), table[order], known)

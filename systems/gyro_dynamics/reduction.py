@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.curve_misfit import LEAST, alike
 from gyrobench.reduction.loops.loop_curves import bode, curve, trace
@@ -43,8 +44,8 @@ STEP_GAIN = ("g_step", "angle of the float over that of the case, from steps", "
 SMALL = 1e-4  # of an error, by which sensitivities are taken
 LAG = 1e-6  # s, the same
 NO_CURVE = ("response.angle", "response.sense")  # mistakes with which no curve of a float fits
-UNSEEN = "not seen up to {f:.4g} Hz: the bearings are stiff, or higher frequencies are needed"
-NOT_REACHED = "not reached up to {f:.4g} Hz, the highest frequency"
+UNSEEN = "not seen up to {f} Hz: the bearings are stiff, or higher frequencies are needed"
+NOT_REACHED = "not reached up to {f} Hz, the highest frequency"
 UNSURE = "the elasticity is seen, but leaves this open by more than a tenth"
 ELASTIC = ("tau_0", "f_0", "K_I", "K_O")
 NO_SPIN = "the angular momentum H is not given"
@@ -86,7 +87,8 @@ class Reduction(MeasureReduction):
             else "theta_f\\/theta_I = g \\/ (a_2 tau_0 s^3 + a_2 s^2 + tau s + 1)",
             conventions=[
                 "Angles: float against case over case against the stars; a lag is negative.",
-                f"Table: angles of {least:.3g} to {most:.3g} ′ about the {'output' if self.output else 'input'} axis.",
+                f"Table: angles of {plain(least, 3)} to {plain(most, 3)} ′ about the "
+                f"{'output' if self.output else 'input'} axis.",
             ],
             reasons=reasons,
         )
@@ -141,10 +143,10 @@ class Reduction(MeasureReduction):
     def _why(self, name: str, highest: float) -> str:
         elastic = self.figures is not None and self.figures.fit.elastic
         if name == "f_3dB":
-            return NOT_REACHED.format(f=highest)
+            return NOT_REACHED.format(f=plain(highest, 4))
         if elastic and self.figures is not None and not self.figures.determined:
             return UNSURE
-        return NO_SPIN if elastic and name in ("K_I", "K_O") else UNSEEN.format(f=highest)
+        return NO_SPIN if elastic and name in ("K_I", "K_O") else UNSEEN.format(f=plain(highest, 4))
 
     def _u(self, source: Source) -> float:
         u = float(self.run.options.get(source.option, 0.0) or 0.0)
@@ -259,8 +261,8 @@ class Reduction(MeasureReduction):
         fit = self.figures.fit if self.figures else None
         if fit and points.known and fit.chi2 > fit.dof + 4.0 * math.sqrt(2.0 * fit.dof):
             text = (
-                f"The curve does not fit the points: χ² = {fit.chi2:.3g} of {fit.dof} degrees of freedom. u of the "
-                "figures is widened by its root. The gyro has dynamics of another kind, or points are wrong."
+                f"The curve does not fit the points: χ² = {plain(fit.chi2, 3)} of {fit.dof} degrees of freedom. u of "
+                "the figures is widened by its root. The gyro has dynamics of another kind, or points are wrong."
             )
             found.doubt("response.misfit", text)
         elif fit and not points.known and self._neighbours_alike():

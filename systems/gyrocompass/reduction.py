@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.loop_toolkit import DEG, Account, Array, Gate, LoopReduction, Response, line, wrapped
 
 from .findings import KNOWN, CompassFindings, error, means, steaming, wrap
@@ -78,7 +79,8 @@ class Reduction(LoopReduction):
         after = float(t[swing[-1]] - gate.t[0]) if swing.size and self.damped else 0.0
         fitted = found.fitted(gate, "settling", free=not self.damped, after=after)
         if fitted is None:
-            found.unsettled = f"the heading swings by more than {SMALL / DEG:.3g}° nearly to the end of its settling"
+            small = plain(SMALL / DEG, 3)
+            found.unsettled = f"the heading swings by more than {small}° nearly to the end of its settling"
             found.note("settling time", "from switch-on to the band", "h", math.nan, math.nan)
             return
         if not self.damped:
@@ -93,9 +95,9 @@ class Reduction(LoopReduction):
         outside = np.flatnonzero(np.abs(z - fitted.settled) > band)
         if fitted.left > band or (outside.size and outside[-1] >= z.size - 2):
             hours = gate.row.dwell / 3600.0
-            found.unsettled = f"not settled to {band / DEG:.3g}° when the phase of {hours:.3g} h ended"
+            found.unsettled = f"not settled to {plain(band / DEG, 3)}° when the phase of {plain(hours, 3)} h ended"
         closed = None if own is None else _closed_settling(own, gate, at, band, (self.offset, self.tilt))
-        meaning = f"from switch-on until it stays within {band / DEG:.3g}° of the settled error"
+        meaning = f"from switch-on until it stays within {plain(band / DEG, 3)}° of the settled error"
         time, u_time = (math.nan, math.nan) if found.unsettled else _settled_after(t, z, gate.t[0], fitted, band)
         found.note("settling time", meaning, "h", time, u_time, closed)
         found.note("latitude error", "heading error at rest when settled", "°", wrap(fitted.settled), fitted.u_settled,
@@ -107,7 +109,7 @@ class Reduction(LoopReduction):
         found, model = self.found, self.found.guess(at, False) if self.own else None
         short = ""
         if span < SPAN * 2.0 * math.pi / fitted.omega:
-            short = f"{span / 60.0:.3g} min of swing below {SMALL / DEG:.3g}° are too short"
+            short = f"{plain(span / 60.0, 3)} min of swing below {plain(SMALL / DEG, 3)}° are too short"
         (period, u), (ratio, u_ratio) = fitted.damped_period, fitted.damping_ratio
         if math.isfinite(period) or short:
             found.measure("damped period", "of the damped oscillation", "min", period, math.hypot(u, bent * period),
@@ -193,7 +195,7 @@ class Reduction(LoopReduction):
             closed = [wrap(end - own.settled_error(steaming(g))) for g in (before, gate)]
         swings = ""
         if last.left > max(STILL, 2.0 * u_start):
-            swings = f"the axis swung by {last.left / DEG:.2g}° when the manoeuvre began"
+            swings = f"the axis swung by {plain(last.left / DEG)}° when the manoeuvre began"
         rows = (
             ("ballistic deflection", "change of the heading shown while course or speed change", last, closed[0]),
             ("ballistic error", "error at the end of the manoeuvre less the settled one after it", now, closed[1]),
@@ -207,15 +209,16 @@ class Reduction(LoopReduction):
         found, own = self.found, self.own
         if abs(self.offset) > LARGE:
             text = (
-                f"The axis starts {abs(self.offset) / DEG:.3g}° off: beyond {LARGE / DEG:.3g}° it does not swing as a "
-                f"linear system. Period, damping ratio and settled error are of its swings below {SMALL / DEG:.3g}°."
+                f"The axis starts {plain(abs(self.offset) / DEG, 3)}° off: beyond {plain(LARGE / DEG, 3)}° it does not "
+                "swing as a linear system. Period, damping ratio and settled error are of its swings below "
+                f"{plain(SMALL / DEG, 3)}°."
             )
             found.warn("compass.large_angle", text)
         latitude = max(abs(float(g["ship.latitude_now"].max())) for g in found.gates)
         if latitude > POLAR:
             text = (
-                f"At {latitude / DEG:.3g}° of latitude the horizontal Earth rate is {math.cos(latitude):.2g} of that "
-                "at the equator: effects of drift, speed error and latitude error grow with its reciprocal."
+                f"At {plain(latitude / DEG, 3)}° of latitude the horizontal Earth rate is {plain(math.cos(latitude))} "
+                "of that at the equator: effects of drift, speed error and latitude error grow with its reciprocal."
             )
             found.warn("compass.polar", text)
         if own is not None:
@@ -223,11 +226,11 @@ class Reduction(LoopReduction):
             worst = max(rolled, *(abs(own.settled(steaming(g))[0]) for g in found.gates))
             if worst > STRONG:
                 text = (
-                    f"The axis settles up to {worst / DEG:.3g}° off the meridian: the closed forms, of small angles, "
-                    "miss by more than 1 % there."
+                    f"The axis settles up to {plain(worst / DEG, 3)}° off the meridian: the closed forms, of small "
+                    "angles, miss by more than 1 % there."
                 )
                 found.warn("compass.off_meridian", text)
-                text = f"The axis settles {worst / DEG:.3g}° off the meridian, beyond small angles."
+                text = f"The axis settles {plain(worst / DEG, 3)}° off the meridian, beyond small angles."
                 found.doubt("compass.small_angles", text)
         if found.unsettled:
             text = f"The compass has {found.unsettled}: errors that follow have no value. Give settle more time."

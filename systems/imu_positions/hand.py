@@ -30,6 +30,7 @@ from gyrobench.reduction.toolkit import (
     Reason,
     Record,
     Table,
+    plain,
 )
 
 from . import mistakes, norms, tables, turns
@@ -89,8 +90,8 @@ class HandReduction(ChannelTests[HandSetup]):
         size = float(np.median(np.linalg.norm(at.acc, axis=1)))
         if "a" not in s.counts and abs(size / s.gravity - 1.0) > 0.2:
             found.append(
-                f"accelerometers: at rest they read {size:.4g} m/s², gravity is {s.gravity:.4g}: the unit is mistaken "
-                "(readings in g, counts: write '[g]', '[counts]' behind the names of the columns)"
+                f"accelerometers: at rest they read {plain(size, 4)} m/s², gravity is {plain(s.gravity, 4)}: the unit "
+                "is mistaken (readings in g, counts: write '[g]', '[counts]' behind the names of the columns)"
             )
         elif at.enough and not np.array_equal(at.labels[1], np.eye(3)):
             found.append(_labels(at.labels[1]))
@@ -105,8 +106,8 @@ class HandReduction(ChannelTests[HandSetup]):
         rate = (self.at.gyro - np.median(self.at.gyro, axis=0)) / self.at.scale_g
         size = np.max(np.abs(rate), axis=1)
         return [
-            f"position {k + 1} (t = {self.at.start[k]:.6g} s): the gyros read {math.degrees(size[k]):.3g} °/s more "
-            "than in the others: it was not at rest"
+            f"position {k + 1} (t = {plain(self.at.start[k], 6)} s): the gyros read {plain(math.degrees(size[k]), 3)} "
+            "°/s more than in the others: it was not at rest"
             for k in np.flatnonzero(size > STEADY)
         ]
 

@@ -12,11 +12,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gyrobench.arrays import Array
 from gyrobench.frames import G0
-from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis import handling_candidates as common
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
+from gyrobench.reduction.toolkit import Array, Record, plain
 
 from .channels import AXES, CHANNELS
 from .geometry import STILL
@@ -62,7 +61,7 @@ def triad_problems(matrix: Array, kind: str) -> list[str]:
     best = min(signed_permutations(), key=lambda p: float(np.linalg.norm(matrix / size - p)))
     off = float(np.max(np.abs(matrix / size - best)))
     if off > SOUND:
-        rows = "; ".join(" ".join(f"{x:.3g}" for x in row) for row in matrix)
+        rows = "; ".join(" ".join(plain(x, 3) for x in row) for row in matrix)
         return [
             f"{NAME[kind]}: the readings are not those of three axes in these positions (matrix by rows: {rows}): "
             "a position, an axis or the sense of an angle is mistaken"
@@ -110,7 +109,7 @@ def scaled(size: float, kind: str) -> list[str]:
     near = min(UNITS[kind], key=lambda f: abs(math.log(size / f)))
     if abs(size / near - 1.0) < SOUND:
         return [UNITS[kind][near]]
-    return [f"the readings are {size:.4g} times what the positions make: unit or scale factor is mistaken"]
+    return [f"the readings are {plain(size, 4)} times what the positions make: unit or scale factor is mistaken"]
 
 
 def candidates(record: Record) -> Iterator[HandlingCandidate]:

@@ -42,6 +42,7 @@ from gyrobench.reduction.toolkit import (
     Regression,
     RunDocument,
     Table,
+    plain,
     window_problems,
 )
 from gyrobench.units import DPH
@@ -324,8 +325,8 @@ class Reduction(ChannelTests[ImuSetup]):
             return ["thermal = true: the record has no column temperature [degC]"]
         if s.thermal and (span := float(np.ptp(self.windows["temperature"]))) < LEAST_SPAN:
             return [
-                f"thermal = true: the temperature changes by {span:.3g} K in all, which shows nothing of it: was that "
-                "of the room read, or of a chamber that stood still?"
+                f"thermal = true: the temperature changes by {plain(span, 3)} K in all, which shows nothing of it: was "
+                "that of the room read, or of a chamber that stood still?"
             ]
         return self._mistaken()
 

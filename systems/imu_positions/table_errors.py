@@ -13,12 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import asked
-from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.nuisances import BOTH
-from gyrobench.reduction.setup.sources import Source
-from gyrobench.result import Reason
+from gyrobench.reduction.toolkit import Array, Findings, Reason, Source, plain
 from gyrobench.units import ARCSEC
 
 from .budget import ImuSetup
@@ -82,7 +79,7 @@ def _sentence(taken: list[Error], alike: list[Error]) -> str:
 
 def _words(source: Source, size: float, u: float) -> str:
     unit, (s, v) = "″" if source.unit == "rad" else "", _scaled(source, size, u)
-    return f"{source.name}, {s:.4g}{unit} (u = {v:.2g}{unit})".replace("-", "−")
+    return f"{source.name}, {plain(s, 4)}{unit} (u = {plain(v)}{unit})".replace("-", "−")
 
 
 def _correction(source: Source, size: float, u: float) -> str:

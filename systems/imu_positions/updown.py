@@ -48,6 +48,7 @@ from gyrobench.reduction.toolkit import (
     Regression,
     RunDocument,
     Table,
+    plain,
 )
 from gyrobench.result import Reason
 from gyrobench.units import DPH
@@ -222,7 +223,8 @@ class UpDownReduction(ChannelTests[ImuSetup]):
         size = float(np.median(np.linalg.norm([self.windows[f"mean_a{a}"] for a in AXES], axis=0)))
         if abs(size / s.gravity - 1.0) > 0.2:
             return [
-                f"accelerometers: at rest they read {size:.4g} m/s², gravity is {s.gravity:.4g}: the unit is mistaken"
+                f"accelerometers: at rest they read {plain(size, 4)} m/s², gravity is {plain(s.gravity, 4)}: the unit "
+                "is mistaken"
             ]
         return []
 

@@ -24,8 +24,7 @@ from typing import Any, Self
 import numpy as np
 
 from gyrobench import units
-from gyrobench.arrays import Array
-from gyrobench.result import Table
+from gyrobench.reduction.toolkit import Array, Table, plain
 from gyrobench.units import ARCMIN, DEG, DPH
 
 from . import plans
@@ -188,8 +187,8 @@ def lost(method: str, u_bias: float, latitude: float) -> list[str]:
     if method != "strapdown" or 3.0 * u_bias <= north:
         return []
     return [
-        f"u_bias = {u_bias / DPH:.4g} °/h: one position determines no heading where three times this is above the "
-        f"horizontal Earth rate, {north / DPH:.4g} °/h; take the method strapdown two"
+        f"u_bias = {plain(u_bias / DPH, 4)} °/h: one position determines no heading where three times this is above "
+        f"the horizontal Earth rate, {plain(north / DPH, 4)} °/h; take the method strapdown two"
     ]
 
 
@@ -199,8 +198,8 @@ def in_words(time: float | None) -> str:
         return "never"
     for unit, size in (("h", 3600.0), ("min", 60.0)):
         if time >= 2.0 * size:
-            return f"after {time / size:.2g} {unit}"
-    return f"after {time:.3g} s"
+            return f"after {plain(time / size)} {unit}"
+    return f"after {plain(time, 3)} s"
 
 
 def table(p: Mapping[str, Any], latitude: float, gravity: float, bias: float = 0.0) -> list[Table]:
@@ -224,7 +223,7 @@ def table(p: Mapping[str, Any], latitude: float, gravity: float, bias: float = 0
         rows.append([minutes, *shown, tilt / ARCMIN if tilt is not None else None])
     caption = (
         "Standard deviations by bias, white noise, flicker and random walk of the instruments, closed form, of "
-        f"readings without moves; empty: beyond {MOST / DEG:.3g}°"
+        f"readings without moves; empty: beyond {plain(MOST / DEG, 3)}°"
     )
     head = ["t / min", "σ(ψ), one position / °", "σ(ψ), two positions / °", "σ(tilt), one position / ′"]
     times: list[list[Any]] = []
@@ -252,8 +251,8 @@ def methods_table(density: float, time: float, settle: float, latitude: float, p
         tilt = "measured" if strapdown or method == "tilt" else "taken for level"
         rows.append([method, reading, sigma, needs, bias, tilt])
     caption = (
-        f"Standard deviation of the heading by white noise of {density / DPH:.3g} °/h/√Hz, closed form, in the same "
-        "total time, moves of the head included"
+        f"Standard deviation of the heading by white noise of {plain(density / DPH, 3)} °/h/√Hz, closed form, in the "
+        "same total time, moves of the head included"
     )
     head = ["method", "time of readings / s", "σ(ψ) / ′", "needs", "bias of the gyro", "tilt of the head"]
     return [Table("methods", "Methods in the same time", caption, head, rows)]

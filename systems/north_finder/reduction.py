@@ -34,7 +34,7 @@ from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all
 from gyrobench.reduction.setup.setups import SiteSetup
 from gyrobench.reduction.setup.sources import LATITUDE, Effect
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Group, Location, Quantity, Record, told
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Group, Location, Quantity, Record, plain, told
 from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import ARCMIN, DEG, DPH
 
@@ -164,8 +164,8 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         if abs(A / self.north - 1.0) > NEAR:
             small = ", or the gyro answers it in part (dead band, lock-in, steps of its word)" * bool(self.north > A)
             raise ReductionError(
-                f"horizontal Earth rate {A / DPH:.4g} °/h, at this latitude it is {self.north / DPH:.4g} °/h: "
-                f"latitude, unit or axes are wrong, or the base moves{small}"
+                f"horizontal Earth rate {plain(A / DPH, 4)} °/h, at this latitude it is {plain(self.north / DPH, 4)} "
+                f"°/h: latitude, unit or axes are wrong, or the base moves{small}"
             )
 
         def near(angle: float) -> float:  # no jump at the south
@@ -200,8 +200,8 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         U = math.sqrt(half**2 + NORMAL**2 * sum(v * v for v in b))
         if abs(x) > 1.0 + max(MOST * U, NEAR):
             raise ReductionError(
-                f"the rates of the two positions differ by {abs(x):.3g} of what the Earth's can at this latitude: "
-                "latitude, unit or axes are wrong, or the base moves"
+                f"the rates of the two positions differ by {plain(abs(x), 3)} of what the Earth's can at this "
+                "latitude: latitude, unit or axes are wrong, or the base moves"
             )
         x, sense = max(-1.0, min(1.0, x)), -math.copysign(1.0, psi)
         if U < 1e-9:
@@ -285,8 +285,8 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         if s.method == "strapdown" and not GYRO_BIAS.size(s) and not s.unbiased:
             turned = math.degrees(0.1 * DPH / self.north)
             text = (
-                f"One position leaves the bias of the gyro in the heading, which 0.1 °/h turn by up to {turned:.2g}°. "
-                "It is not in u. State u_bias, or take the method strapdown two."
+                "One position leaves the bias of the gyro in the heading, which 0.1 °/h turn by up to "
+                f"{plain(turned)}°. It is not in u. State u_bias, or take the method strapdown two."
             )
             reasons.append(Reason("gyro.bias.unstated", text, severity="error"))
             reasons.append(_doubt("gyro.bias", "The bias of the gyro is in the heading, and not in u.", "pass"))
@@ -308,16 +308,17 @@ class Reduction(DriftReduction[NorthFinderSetup]):
     def _side(self, psi: Coefficient) -> list[Reason]:
         """Return what speaks against the heading that the rough one chose, of the two that two positions have."""
         s, second = self.setup, self._other(psi.estimate * DEG) / DEG
-        both = f"Two positions have two headings, {psi.estimate:.4g}° and {second:.4g}°"
+        both = f"Two positions have two headings, {plain(psi.estimate, 4)}° and {plain(second, 4)}°"
         if not s.sigma_rough:
             chosen = (
-                f"{both}; the rough one, {s.rough / DEG:.4g}°, chose, and nothing in the record would show that it "
+                f"{both}; the rough one, {plain(s.rough / DEG, 4)}°, chose, and nothing in the record would show that "
+                "it "
             )
             text = f"{chosen}lies on the wrong side. State its standard uncertainty, sigma_rough, or {THIRD}."
             return [] if s.rough_stated else [_doubt("rough.unstated", text, "pass")]
         u = math.hypot(s.sigma_rough, psi.u * DEG)
         here, other = (abs(math.remainder(x * DEG - s.rough, 2.0 * math.pi)) / u for x in (psi.estimate, second))
-        rough = f"the rough one is {s.rough / DEG:.4g}° ± {s.sigma_rough / DEG:.2g}°"
+        rough = f"the rough one is {plain(s.rough / DEG, 4)}° ± {plain(s.sigma_rough / DEG)}°"
         if here > MOST:
             return [_doubt("rough.contradicts", f"{both}; {rough} (u), {here:.1f} standard uncertainties from it.")]
         if other < MOST and not psi.interval[0] < second < psi.interval[1]:
@@ -330,7 +331,7 @@ class Reduction(DriftReduction[NorthFinderSetup]):
         psi, expected = coefficients[0], self.north / DPH
         decimals = max(0, 1 - math.floor(math.log10(psi.k * psi.u))) if psi.u > 0.0 else 3
         compass = f"{round(psi.estimate % 360.0, decimals) % 360.0:.{decimals}f}"
-        rate = f"Horizontal Earth rate {{A}}; the latitude gives {expected:.5g} °/h."
+        rate = f"Horizontal Earth rate {{A}}; the latitude gives {plain(expected, 5)} °/h."
         return [
             *told(coefficients, f"Heading ψ = {{ψ}}, clockwise from north; on the compass {compass}°."),
             *found.nuisance_sentences(),

@@ -34,7 +34,7 @@ from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.setup.setups import SiteSetup, attitude_of
 from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, LATITUDE, Effect
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, told, truth_of
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, plain, told, truth_of
 from gyrobench.result import Coefficient, Reason, Table
 from gyrobench.units import ARCSEC, DPH
 
@@ -105,7 +105,7 @@ def null_angles(
             )
         G = float(np.linalg.lstsq(X / size, np.diff(u), rcond=None)[0][0] / size[0])
         if not G > 0.0:
-            raise ReductionError(f"gain of the pickoff {G:.4g} V/rad: must be positive; turn the sign of u round")
+            raise ReductionError(f"gain of the pickoff {plain(G, 4)} V/rad: must be positive; turn the sign of u round")
         null = theta - u / G
         cross = coupled(null)
     return null, G, cross
@@ -214,8 +214,8 @@ class Reduction(DriftReduction[OpenLoopSetup]):
         turned = math.degrees(float(np.ptp(self.theta)))
         if turned > 2.0:
             text = (
-                f"The case turned by {turned:.3g}° against gravity as it followed the sky: its drift changed on the "
-                "way, and the result is some mean of it; take a shorter test, or an input axis east or west."
+                f"The case turned by {plain(turned, 3)}° against gravity as it followed the sky: its drift changed on "
+                "the way, and the result is some mean of it; take a shorter test, or an input axis east or west."
             )
             out.append(Reason("case.turned", text))
         if reach is not None and self.used > 0.8 * reach:
@@ -240,10 +240,10 @@ class Reduction(DriftReduction[OpenLoopSetup]):
 
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         reach = self.setup.reach
-        beyond = "" if reach is None else f" of {reach / ARCSEC:.4g}″ to saturation"
+        beyond = "" if reach is None else f" of {plain(reach / ARCSEC, 4)}″ to saturation"
         return [
             *told(coefficients, "Drift ω_d = {ω_d} in one attitude."),
-            f"Range of the pickoff used: {self.used / ARCSEC:.4g}″ of case angle{beyond}.",
+            f"Range of the pickoff used: {plain(self.used / ARCSEC, 4)}″ of case angle{beyond}.",
             found.noise_sentence("intervals"),
             *found.nuisance_sentences(),
         ]

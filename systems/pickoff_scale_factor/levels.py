@@ -16,7 +16,7 @@ import numpy as np
 from scipy import special
 
 from gyrobench import units
-from gyrobench.arrays import Array
+from gyrobench.reduction.toolkit import Array, plain
 from gyrobench.result import Coefficient, Series, Table
 
 ARCMIN = units.factor("arcmin")
@@ -55,7 +55,7 @@ class Levels:
     def coefficients(self) -> list[Coefficient]:
         """Return the zero and the largest departure from the line."""
         k = int(np.argmax(np.abs(self.departure)))
-        where = f"at {self.angle[k] / ARCMIN:.4g}′"
+        where = f"at {plain(self.angle[k] / ARCMIN, 4)}′"
         zero = ("u_0", "voltage at table angle 0 in the middle of the test", "mV")
         straight = ("linearity", f"largest departure from the line, {where}, of the span", "%")
         return [

@@ -33,7 +33,7 @@ from gyrobench.reduction.estimation.linear_fit import Regression
 from gyrobench.reduction.setup import sources
 from gyrobench.reduction.setup.run_metadata import Location, truth_of
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.reduction.toolkit import Array, DriftReduction, Findings, Group, Quantity, Record, Setup, told
+from gyrobench.reduction.toolkit import Array, DriftReduction, Findings, Group, Quantity, Record, Setup, plain, told
 from gyrobench.result import Coefficient, DriftTestResult, Reason
 from gyrobench.system.families.servo_channel import own_name
 from gyrobench.units import ARCSEC, DPH
@@ -172,7 +172,7 @@ class Reduction(DriftReduction[PickoffSetup]):
         self.levels = Levels.of(self.angle, self.seen, self.t, self.u, moved, 2 if self.both else 0)
         once = (
             "The angles were gone over once: drift cannot be told from slope; by the bound on it, S may be wrong by up "
-            f"to {self.bound / self.span * 100:.2g} %. Going back over the same angles tells it."
+            f"to {plain(self.bound / self.span * 100)} %. Going back over the same angles tells it."
         )
         drifting = " - S omega_d (t - t_m) + r (t - t_m)^2\\/2" if self.both else ""
         return Account(
@@ -208,7 +208,7 @@ class Reduction(DriftReduction[PickoffSetup]):
             )
         return (
             "Table angle right-handed about the input axis; the float follows it with the gain H/C "
-            f"= {self.setup.gain:.9g}, so that S = K_sg H/C."
+            f"= {plain(self.setup.gain, 9)}, so that S = K_sg H/C."
         )
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
@@ -220,10 +220,10 @@ class Reduction(DriftReduction[PickoffSetup]):
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         return [
             *told(coefficients, "Pickoff scale factor S = {S} per angle of the case, K_sg = {K_sg}."),
-            f"Largest departure from the line {abs(coefficients[-1].estimate):.2g} % of the span of "
-            f"{self.span / ARCMIN:.4g}′.",
-            f"The test took {self.duration:.3g} s: a drift of {self.setup.drift / DPH:.3g} °/h is at most "
-            f"{self.bound / ARCSEC:.3g}″, {self.bound / self.span * 100:.2g} % of the span.",
+            f"Largest departure from the line {plain(abs(coefficients[-1].estimate))} % of the span of "
+            f"{plain(self.span / ARCMIN, 4)}′.",
+            f"The test took {plain(self.duration, 3)} s: a drift of {plain(self.setup.drift / DPH, 3)} °/h is at most "
+            f"{plain(self.bound / ARCSEC, 3)}″, {plain(self.bound / self.span * 100)} % of the span.",
         ]
 
 

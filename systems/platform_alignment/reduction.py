@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from gyrobench import units
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.loop_toolkit import ARCMIN, Account, MeasureReduction, told
 from gyrobench.reduction.setup.run_metadata import Location
 
@@ -89,12 +90,12 @@ class Reduction(MeasureReduction):
         if self.heading is not None and self.final is not None:
             k, n = self.heading, self.final
             sentences.append(
-                f"Standard deviation: {run.sigma[k] / ARCMIN:.3g}′ by the coarse stage after {run.t[k]:.0f} s, "
-                f"{run.sigma[n] / ARCMIN:.3g}′ by the gyrocompass after {run.t[n]:.0f} s."
+                f"Standard deviation: {plain(run.sigma[k] / ARCMIN, 3)}′ by the coarse stage after {run.t[k]:.0f} s, "
+                f"{plain(run.sigma[n] / ARCMIN, 3)}′ by the gyrocompass after {run.t[n]:.0f} s."
             )
         if found.budget:
             first = found.budget[0]
-            sentences.append(f"Largest contribution: {first.source}, {60.0 * first.contribution:.2g}′.")
+            sentences.append(f"Largest contribution: {first.source}, {plain(60.0 * first.contribution)}′.")
         return sentences
 
     def _value(self, name: str, meaning: str, unit: str, value: float, u: float, true: float, why: str) -> None:
@@ -107,7 +108,7 @@ class Reduction(MeasureReduction):
     def _ready(self) -> None:
         """Measure the time to be ready; closed: by the error model.  No value where the heading was not held ready."""
         run, wanted = self.a.run, float(self.run.options["wanted"])
-        meaning = f"from switch-on to a standard deviation of {wanted / ARCMIN:.3g}′, held to the end"
+        meaning = f"from switch-on to a standard deviation of {plain(wanted / ARCMIN, 3)}′, held to the end"
         if why := self.why or ("" if run.ready[-1] == 1.0 else f"not ready: {_why_not(run, wanted)}"):
             self.found.measure("ready time", meaning, "s", None, unsettled=why)
             return
@@ -141,15 +142,15 @@ class Reduction(MeasureReduction):
         run, found = self.a.run, self.found
         ratio = _restless(self.a, late)
         text = (
-            f"The specific force moves the gyrocompass {ratio:.2g} times as much as the stated noise of gyros and "
+            f"The specific force moves the gyrocompass {plain(ratio)} times as much as the stated noise of gyros and "
             "accelerometers does. The standard deviation of the heading may be too small; the base moves, or a sensor "
             "is noisier than stated."
         )
         doubts = {"alignment.restless": text if ratio > RESTLESS else ""}
         model = float(np.interp(run.t[-1], self.a.history.t, self.a.sigma))
         text = (
-            f"The standard deviation of the controller, {run.sigma[-1] / ARCMIN:.3g}′, is not that of the error model, "
-            f"{model / ARCMIN:.3g}′."
+            f"The standard deviation of the controller, {plain(run.sigma[-1] / ARCMIN, 3)}′, is not that of the error "
+            f"model, {plain(model / ARCMIN, 3)}′."
         )
         doubts["alignment.other_model"] = text if abs(run.sigma[-1] / model - 1.0) > SETTLING else ""
         z = float(abs(run.error[-1]) / max(run.sigma[-1], 1e-12))
@@ -178,7 +179,7 @@ def _why_not(run: AlignmentColumns, wanted: float) -> str:
         return words[float(run.status[-1])]
     if run.mode[-1] < plans.FAST:
         return f"the run ended in the stage {plans.STAGES[int(run.mode[-1]) - 1]}"
-    return f"standard deviation {run.sigma[-1] / ARCMIN:.3g}′ at the end, {wanted / ARCMIN:.3g}′ wanted"
+    return f"standard deviation {plain(run.sigma[-1] / ARCMIN, 3)}′ at the end, {plain(wanted / ARCMIN, 3)}′ wanted"
 
 
 def _restless(a: Alignment, late: slice) -> float:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.loop_curves import line, over_time
 from gyrobench.result import BudgetLine, Response, Table
 from gyrobench.units import ARCMIN, ARCSEC, DEG
@@ -105,7 +106,7 @@ def _stages(a: Alignment) -> Table:
 
 
 def _pole(p: complex) -> str:
-    text = f"{p.real:.3g}" + (f" ± {p.imag:.3g}j" if p.imag else "")
+    text = plain(p.real, 3) + (f" ± {plain(p.imag, 3)}j" if p.imag else "")
     return text.replace("-", "−")
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.loop_toolkit import ARCMIN, DPH, Account, Gate, LoopReduction, Table, drift, over_time
 from gyrobench.reduction.loops.slow_drift import slow_drift
 from gyrobench.units import display
@@ -128,8 +129,9 @@ class Reduction(LoopReduction):
         c = {c.name: c for c in self.found.coefficients}
         drift_, tilt, heading = (c[n].estimate for n in ("drift", "tilt 1 h", "heading 1 h"))
         return [
-            f"The platform drifts against level and north by {drift_:.3g} °/h; the budget allows for {total:.3g} °/h.",
-            f"After an hour it would be {tilt:.3g}′ off level and {abs(heading):.3g}′ off north.",
+            f"The platform drifts against level and north by {plain(drift_, 3)} °/h; the budget allows for "
+            f"{plain(total, 3)} °/h.",
+            f"After an hour it would be {plain(tilt, 3)}′ off level and {plain(abs(heading), 3)}′ off north.",
         ]
 
 

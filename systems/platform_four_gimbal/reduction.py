@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.gimbal_test import GimbalTest
 from gyrobench.reduction.loops.gimbals import DEG, Flight, legs_table, lock_table, spans
 from gyrobench.reduction.loops.loop_measures import Step
@@ -78,7 +79,7 @@ class Reduction(GimbalTest):
         fast = max(float(np.abs(flight[name]).max()) for name in RATES)
         top = self.run.parameters.get("platform.rate_max")
         if top and fast >= float(top) * (1.0 - 1e-9):
-            text = f"A gimbal was at its largest rate, {float(top) / DEG:.4g}°/s, in the flight."
+            text = f"A gimbal was at its largest rate, {plain(float(top) / DEG, 4)}°/s, in the flight."
             found.warn("gimbal.rate_max", text)
         return [*_said(flight, travel / DEG, steep), *self.servo_limits(flight, RATES)]
 
@@ -93,17 +94,17 @@ def _said(flight: Flight, travel: float, steep: Array) -> list[str]:
     error = flight.error / DEG
     worst = int(np.argmax(error))
     if error[worst] <= KEPT:
-        first = f"The inner element was kept within {error[worst]:.2g}° all through the flight."
+        first = f"The inner element was kept within {plain(error[worst])}° all through the flight."
     else:
         a, b = spans(error > KEPT)[0]
-        again = f"; from {flight.t[b]:.4g} s on it is below again." if b < error.size - 1 else "."
+        again = f"; from {plain(flight.t[b], 4)} s on it is below again." if b < error.size - 1 else "."
         first = (
-            f"The inner element was not kept: from t = {flight.t[a]:.4g} s (leg “{flight.leg_at(a)}”, pitch gimbal "
-            f"{flight[PITCH][a] / DEG:.4g}°) its error is above {KEPT:g}°, at most {error[worst]:.3g}° at "
-            f"t = {flight.t[worst]:.4g} s{again}"
+            f"The inner element was not kept: from t = {plain(flight.t[a], 4)} s (leg “{flight.leg_at(a)}”, pitch "
+            f"gimbal {plain(flight[PITCH][a] / DEG, 4)}°) its error is above {KEPT:g}°, at most "
+            f"{plain(error[worst], 3)}° at t = {plain(flight.t[worst], 4)} s{again}"
         )
     if not np.any(steep):
         return [first]
     if travel > 150.0:
-        return [first, f"The fourth gimbal turned over: it travelled {travel:.4g}°."]
-    return [first, f"The fourth gimbal travelled {travel:.4g}° in a flight that passed the vertical."]
+        return [first, f"The fourth gimbal turned over: it travelled {plain(travel, 4)}°."]
+    return [first, f"The fourth gimbal travelled {plain(travel, 4)}° in a flight that passed the vertical."]

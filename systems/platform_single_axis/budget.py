@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.record.frequency_response import model_response
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
@@ -53,8 +54,8 @@ def ride_budget(found: LoopFindings, ride: Gate, angle: str, mean: int) -> dict[
     measured = found.estimates["platform error"]
     if not whole or abs(measured * ARCSEC / whole - 1.0) > WRONG:
         text = (
-            f"No error budget by source: the linear model gives {whole / ARCSEC:.3g}″ for the ride, measured are "
-            f"{measured:.3g}″ (friction that slips, or a limit)."
+            f"No error budget by source: the linear model gives {plain(whole / ARCSEC, 3)}″ for the ride, measured are "
+            f"{plain(measured, 3)}″ (friction that slips, or a limit)."
         )
         found.warn("budget.not_linear", text)
         return {}

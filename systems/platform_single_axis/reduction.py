@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.estimator_metrics import rms
 from gyrobench.reduction.loops.loop_toolkit import (
     ARCSEC,
@@ -97,9 +98,9 @@ class Reduction(LoopReduction):
         k = p.get("gyro.k") or (1.0 / p["stabilizer.K_u"] if p.get("stabilizer.K_u") else None)  # or what was designed
         if k is not None:
             self._reading(ride, float(k))
-        base = f"swings {math.degrees(ride.amplitude):.3g}° at {ride.f:g} Hz" if ride.f else "moves as recorded"
+        base = f"swings {plain(math.degrees(ride.amplitude), 3)}° at {ride.f:g} Hz" if ride.f else "moves as recorded"
         limit = max(sources, key=lambda name: sources[name], default="")
-        by = f"; the largest part is {limit}, {sources[limit] / ARCSEC:.3g}″" if limit else ""
+        by = f"; the largest part is {limit}, {plain(sources[limit] / ARCSEC, 3)}″" if limit else ""
         return f"A base that {base} leaves {{platform error}} rms on the platform, and {{rate error}}{by}."
 
     def _reading(self, ride: Gate, k: float) -> None:

@@ -38,6 +38,7 @@ from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import model_response
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_result import LoopFindings
@@ -264,9 +265,9 @@ def budget(found: LoopFindings, gates: Mapping[str, Gate], angles: Sequence[str]
             if gate.kind == "command":
                 continue  # hardly coupled: what is left is of large angles
             text = (
-                f"No error budget by source for {name}: the linear model gives {math.sqrt(square) / ARCSEC:.3g}″, "
-                f"measured are {measured / ARCSEC:.3g}″ (a limit, unbalance, stiction, rounding, or a motion beyond "
-                "it)."
+                f"No error budget by source for {name}: the linear model gives "
+                f"{plain(math.sqrt(square) / ARCSEC, 3)}″, measured are {plain(measured / ARCSEC, 3)}″ (a limit, "
+                "unbalance, stiction, rounding, or a motion beyond it)."
             )
             found.warn(f"budget.not_linear:{name}", text)
             continue

@@ -9,6 +9,7 @@ import numpy as np
 
 from gyrobench import drift as static
 from gyrobench.frames import G0
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.estimator_metrics import rms
 from gyrobench.reduction.loops.loop_limits import bandwidth
 from gyrobench.reduction.loops.loop_measures import cross_axis, response
@@ -130,7 +131,7 @@ class Reduction(LoopReduction):
             axis, base = XYZ[gate.axis - 1], gate[f"motion.angle[{gate.axis}]"]
             taken, u = _norm([response(gate.t, base, gate[name], gate.f) for name in ANGLES])
             joints = ", ".join(f"{math.degrees(gate[f'platform.theta[{k}]'].mean()):.1f}°" for k in (1, 2, 3))
-            size = f"{math.degrees(gate.amplitude):.3g}° at {gate.f:g} Hz"
+            size = f"{plain(math.degrees(gate.amplitude), 3)}° at {gate.f:g} Hz"
             meaning = f"platform over base, base about {axis}, {size}, joints about {joints}".replace("-", "−")
             if taken:
                 level = 20.0 * math.log10(taken)
@@ -222,7 +223,8 @@ class Reduction(LoopReduction):
             first = int(np.argmax(hit))
             pitch = math.degrees(channels["platform.theta[1]"][first])
             text = (
-                f"The gimbals were near their lock, first at t = {channels['time'][first]:.4g} s, pitch {pitch:.3g}°."
+                f"The gimbals were near their lock, first at t = {plain(channels['time'][first], 4)} s, pitch "
+                f"{plain(pitch, 3)}°."
             )
             self.found.warn("platform.lock", text)
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.gimbal_test import AXES, GimbalTest
 from gyrobench.reduction.loops.gimbals import DEG, Flight, legs_table, lock_table, spans
 from gyrobench.reduction.loops.loop_measures import Step, cross_axis, response
@@ -105,16 +106,16 @@ class Reduction(GimbalTest):
         ]  # fmt: skip
         limits = self.servo_limits(flight, RATES)
         if not (locked := spans(lock)):
-            kept = f"The platform kept its attitude to {most / DEG:.3g}° in the flight; its gimbals did not lock."
+            kept = f"The platform kept its attitude to {plain(most / DEG, 3)}° in the flight; its gimbals did not lock."
             return [kept, *limits]
         a, b = locked[0]
-        when, angle = float(flight.t[a]), float(middle[a]) / DEG
-        text = f"Gimbal lock from t = {when:.4g} s (leg “{flight.leg_at(a)}”) at {angle:.4g}° of the middle gimbal"
+        when, angle = plain(float(flight.t[a]), 4), plain(float(middle[a]) / DEG, 4)
+        text = f"Gimbal lock from t = {when} s (leg “{flight.leg_at(a)}”) at {angle}° of the middle gimbal"
         if b < flight.t.size - 1:
-            text += f", to t = {flight.t[b]:.4g} s"
+            text += f", to t = {plain(flight.t[b], 4)} s"
         found.warn("flight.lock", f"{text}.", "error")
-        before = float(flight.error[: a + 1].max()) / DEG
-        dragged = f"the platform was dragged along by up to {most / DEG:.5g}°; until then it was kept to {before:.2g}°."
+        before, after = plain(float(flight.error[: a + 1].max()) / DEG), plain(most / DEG, 5)
+        dragged = f"the platform was dragged along by up to {after}°; until then it was kept to {before}°."
         return [f"{text}: {dragged}", *limits]
 
 

@@ -27,6 +27,7 @@ from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis import handling_candidates
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup.run_metadata import number, truth_of
 from gyrobench.reduction.setup.setups import SiteSetup, attitude_of, scale_factor_problems
 from gyrobench.reduction.setup.sources import CURRENT_OFFSET_OF, TORQUER_SCALE_OF, TURNED, Effect
@@ -116,7 +117,7 @@ class PositionChannel(DriftReduction[PositionSetup]):
             source = replace(TURNED[axis], option="u_attitude", note="the Earth's rate only")
             turned.append(source.effect(s, found.error(-rate / SMALL)))
         stretched = self.columns() * np.array([0.0, 1.0, 1.0])
-        full = f"{float(np.max(np.abs(self.current))) * 1e3:.3g} mA"
+        full = f"{plain(float(np.max(np.abs(self.current))) * 1e3, 3)} mA"
         return [
             *turned,
             PICKOFF.effect(s, found.error(-s.earth[2] * stretched[:, 1], stretched)),
@@ -196,8 +197,8 @@ class Reduction(ChannelTests[PositionSetup]):
                 [c, math.hypot(q.estimate, phi.estimate), most, None if allowed is None else allowed / ARCSEC, gain]
             )
         caption = (
-            f"A tenth of {s.accuracy / DPH:.3g} °/h is left to the springs, at the upper end of their intervals; the "
-            "gain is that of a loop without integral, at Earth rate"
+            f"A tenth of {plain(s.accuracy / DPH, 3)} °/h is left to the springs, at the upper end of their intervals; "
+            "the gain is that of a loop without integral, at Earth rate"
         )
         head = ["channel", "κ / (1/s)", "κ, upper end / (1/s)", "angle allowed / ″", "loop gain needed / (1/s)"]
         found = [Table("springs.allowed", "What the springs allow", caption, head, rows)]
@@ -219,8 +220,8 @@ class Reduction(ChannelTests[PositionSetup]):
             rows.append([c, gain, "yes" if integral else "no", angle / ARCSEC, max(most) * angle / DPH, within])
         need = s.earth_rate / ARCSEC
         caption = (
-            f"k K_sg K_p of the loop that nulls the pickoff; Hu 1981 asks for 1″ at Earth rate, a gain of {need:.3g} "
-            "1/s without integral; with one the angle that stays is the null of the pickoff"
+            "k K_sg K_p of the loop that nulls the pickoff; Hu 1981 asks for 1″ at Earth rate, a gain of "
+            f"{plain(need, 3)} 1/s without integral; with one the angle that stays is the null of the pickoff"
         )
         head = [
             "pickoff", "loop gain / (1/s)", "integral", "angle at Earth rate / ″", "drift of it / (°/h)", "within 1″",

@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis.handling_candidates import changed, exchanged_rows, other_times, shifted
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
 from gyrobench.reduction.diagnosis.scale_mistakes import factor_sentence
-from gyrobench.result import Coefficient, Reason
+from gyrobench.reduction.toolkit import Array, Coefficient, Reason, Record, plain
 from gyrobench.units import DEG
 
 from .steps import direction, levels
@@ -81,8 +79,8 @@ def _transitions(record: Record) -> Iterator[HandlingCandidate]:
         if not np.linalg.norm(own) > 0.1 * np.linalg.norm(held):  # one reading a rate: it is a hysteresis
             continue
         part = float(own @ mean / (own @ own))
-        before = f"a part of {part:.2g} of the rate before in each reading that begins a rate (settle longer)"
-        after = f"a part of {part:.2g} of the rate after in each reading that ends a rate (settle longer)"
+        before = f"a part of {plain(part)} of the rate before in each reading that begins a rate (settle longer)"
+        after = f"a part of {plain(part)} of the rate after in each reading that ends a rate (settle longer)"
         if 0.0 < part <= LATEST:
             words = before if where == "before" else after
             yield HandlingCandidate(words, changed(record, rate=rate + part * held))
@@ -104,8 +102,8 @@ def _left_out(record: Record, X: Array, mean: Array, step: dict[str, Array], gro
     rows = max(groups, key=lambda g: float(left[g] @ off(g)))
     far = float(np.mean(off(rows)))
     parts = {where: far / float(d[rows[0]]) for where, d in step.items() if d[rows[0]]}
-    found = [f"{p:.2g} of the rate {where}" for where, p in parts.items() if 0.0 < p <= LATEST]
-    what = f"held is {' or '.join(found)}" if found else f"off by {far / DEG:.3g} °/s".replace("-", "−")
+    found = [f"{plain(p)} of the rate {where}" for where, p in parts.items() if 0.0 < p <= LATEST]
+    what = f"held is {' or '.join(found)}" if found else f"off by {plain(far / DEG, 3)} °/s".replace("-", "−")
     first, last = rows[[0, -1]] + 1
     where = f"row {first}" if first == last else f"rows {first} to {last}"
     kept = {n: np.delete(np.asarray(v), rows) for n, v in record.windows.items()}
@@ -122,5 +120,5 @@ def implausible(e: Coefficient, a: Coefficient) -> list[Reason]:
         return []
     text = factor_sentence(1.0 + error)
     if abs(1.0 + error) < FAR and abs(a.estimate * 1e-6) > 1.0:
-        text = f"The gyro reads {1.0 + error:.2g} times the rate: {UNSIGNED}"
+        text = f"The gyro reads {plain(1.0 + error)} times the rate: {UNSIGNED}"
     return [Reason("rate.factor", text, ("pass", "fail"), severity="doubt")]

@@ -43,6 +43,7 @@ from gyrobench.reduction.toolkit import (
     Regression,
     RunDocument,
     SiteSetup,
+    plain,
     told,
     window_problems,
 )
@@ -127,7 +128,7 @@ class Reduction(DriftReduction[RateTableSetup]):
         rows: list[tuple[str, str, str, Array]] = [
             ("e", "scale factor error, of both senses together, at small rates", "ppm", w),
             ("a", "asymmetry: scale factor of positive less that of negative rates", "ppm", np.abs(w) / 2.0),
-            ("c", f"change of the scale factor from 0 to {R / DEG:.6g} °/s, as its square", "ppm", w**3 / R**2),
+            ("c", f"change of the scale factor from 0 to {plain(R / DEG, 6)} °/s, as its square", "ppm", w**3 / R**2),
             ("h", "hysteresis: half of what a rate reached from below reads more than from above", "deg/h", self.d),
             ("b", "bias, without the Earth rate", "deg/h", np.ones_like(w)),
         ]  # fmt: skip
@@ -247,9 +248,9 @@ class Reduction(DriftReduction[RateTableSetup]):
             ],
             equation="y - w = b + e w + a/2 abs(w) + c w (w/R)^2 + h d",
             conventions=[
-                f"w: rate of the table and the Earth rate along its axis, {self.setup.earth / DPH:.6g} °/h.",
-                f"R = {self.full / DEG:.6g} °/s, the largest rate; d = 1 where a rate was reached from below, −1 from "
-                "above.",
+                f"w: rate of the table and the Earth rate along its axis, {plain(self.setup.earth / DPH, 6)} °/h.",
+                f"R = {plain(self.full / DEG, 6)} °/s, the largest rate; d = 1 where a rate was reached from below, −1 "
+                "from above.",
                 "e is the error of the scale factor that the gyro is read with: 0 where that is right.",
             ],
             closed_caption="Least squares under the noise model; closed: the straight line alone, unweighted",
@@ -279,8 +280,8 @@ class Reduction(DriftReduction[RateTableSetup]):
         if not off > 1e-6 * e.k * e.u:
             return []
         text = (
-            f"A gyro with this threshold that passes √(w² − d²) lacks {1e6 * off:.3g} ppm of the smallest rate of the "
-            "sweep, and less of larger ones: e and c hold that in part, their u does not. Take larger steps."
+            f"A gyro with this threshold that passes √(w² − d²) lacks {plain(1e6 * off, 3)} ppm of the smallest rate "
+            "of the sweep, and less of larger ones: e and c hold that in part, their u does not. Take larger steps."
         )
         return [Reason("threshold.tail", text, ("pass", "fail"), ("e", "c"), severity="doubt")]
 
@@ -294,7 +295,7 @@ class Reduction(DriftReduction[RateTableSetup]):
         text = (
             "The drift of a whole-angle gyro goes round with its pattern, and readings that turn it by less than 90° "
             "hold that of the angles they were taken at, which comes back in each cycle: u does not hold it. Take "
-            f"windows of {longest / slow:.2g} s and more at {slow / DEG:.3g} °/s."
+            f"windows of {plain(longest / slow)} s and more at {plain(slow / DEG, 3)} °/s."
         )
         return [Reason("rate.pattern", text, ("pass", "fail"), severity="doubt")]
 

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gyrobench.arrays import Array
-from gyrobench.result import Table
+from gyrobench.reduction.toolkit import Array, Table, plain
 from gyrobench.units import DEG, DPH
 
 PPM = 1e-6
@@ -19,7 +18,7 @@ WAYS = {1.0: "from below", -1.0: "from above", 0.0: "first"}
 
 def signed(x: float) -> str:
     """Return a number of four digits with the sign of the pages."""
-    return f"{x:.4g}".replace("-", "−")
+    return plain(x, 4).replace("-", "−")
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ class Departures:
         j = self.largest
         return (
             f"Largest departure from the straight line: {signed(self.departure[j] / PPM)} ppm of full scale (u = "
-            f"{self.u[j] / PPM:.2g} ppm) {self._place(j)}."
+            f"{plain(self.u[j] / PPM)} ppm) {self._place(j)}."
         )
 
 
@@ -120,5 +119,5 @@ class Cycles:
         noise = float(np.sqrt(np.mean(self.u**2)))
         return [
             f"Repeatability of the scale factor over {self.scale.size} cycles: standard deviation "
-            f"{self.scatter / PPM:.3g} ppm; noise of the readings alone makes {noise / PPM:.2g} ppm."
+            f"{plain(self.scatter / PPM, 3)} ppm; noise of the readings alone makes {plain(noise / PPM)} ppm."
         ]

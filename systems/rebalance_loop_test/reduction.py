@@ -31,6 +31,7 @@ from gyrobench.reduction.drift.pulses import Pulses
 from gyrobench.reduction.drift.window_regressors import BelievedGeometry, Turning, axis_rate, wobbles
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.fit_result import Account, with_values
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup import sources
 from gyrobench.reduction.setup.run_metadata import Location, number, phases
@@ -183,9 +184,10 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
             sources=["TEST-REBAL-LOOP, REBAL-PWM, REBAL-PULSE; Hu 1981, eq. 5-62..5-76, corrected by ET16..ET18"],
             equation='omega/k - x = I_0 + kappa x + kappa_"±" abs(x) + kappa_2 x^2/I + kappa_3 x^3/I^2',
             conventions=[
-                f"k = {s.k * MA / DPH:.6g} °/h/mA; positive current precesses positively; x is the reading, "
+                f"k = {plain(s.k * MA / DPH, 6)} °/h/mA; positive current precesses positively; x is the reading, "
                 "I_0 + (1 + κ) x + … the mean current that flows.",
-                f"Nonlinearities are given at the largest rate, {s.largest / DPH:.6g} °/h, I = {s.full / MA:.6g} mA.",
+                f"Nonlinearities are given at the largest rate, {plain(s.largest / DPH, 6)} °/h, I = "
+                f"{plain(s.full / MA, 6)} mA.",
                 "The drift rate of the gyro is in the bias.",
             ],
             tables=[self._levels(found), *self.small.table()],
@@ -244,10 +246,10 @@ class Reduction(DriftReduction[RebalanceLoopSetup]):
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         value = {c.name: c.estimate for c in coefficients}
         bias, q = value["I_0"] * UA * self.setup.k / DPH, value["resolution"]
-        step = f"quantum {q:.3g} °/h" if q else "not quantized"
+        step = f"quantum {plain(q, 3)} °/h" if q else "not quantized"
         return [
-            *told(coefficients, f"Bias {bias:.4g} °/h, I_0 = {{I_0}}; scale-factor error κ = {{κ}}."),
-            f"A reading of {self.setup.gate:g} s: {step}, standard deviation at rest {value['noise']:.2g} °/h.",
+            *told(coefficients, f"Bias {plain(bias, 4)} °/h, I_0 = {{I_0}}; scale-factor error κ = {{κ}}."),
+            f"A reading of {self.setup.gate:g} s: {step}, standard deviation at rest {plain(value['noise'])} °/h.",
             *self.small.sentence(),
             *found.nuisance_sentences(),
         ]

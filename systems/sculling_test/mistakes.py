@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gyrobench.arrays import Array
 from gyrobench.frames import G0
-from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis.handling_candidates import exchanged_rows, other_times
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
 from gyrobench.reduction.diagnosis.stated_motion import SEVERITY, first_departure
-from gyrobench.result import Reason
+from gyrobench.reduction.toolkit import Array, Reason, Record, plain
 
 from .closed import reading
 
@@ -41,10 +39,10 @@ def other_chain(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Ar
     k, found, far = off
     read, stated = expected[k]
     text = (
-        f"At {motions.motions[k].frequency:g} Hz the computed acceleration is {found / read:.3g} of the reading, the "
-        f"stated filters and algorithm make {stated / read:.3g}. Are frequency (Hz, not rad/s), angle, vibration "
-        "(amplitudes) and acceleration in the units that are given, and interval, filters, sculling, samples and size "
-        "those of the unit?"
+        f"At {motions.motions[k].frequency:g} Hz the computed acceleration is {plain(found / read, 3)} of the reading, "
+        f"the stated filters and algorithm make {plain(stated / read, 3)}. Are frequency (Hz, not rad/s), angle, "
+        "vibration (amplitudes) and acceleration in the units that are given, and interval, filters, sculling, "
+        "samples and size those of the unit?"
     )
     blocked, severity = SEVERITY[far]
     yield Reason("sculling.stated", text.replace(" -", " −"), blocked, severity=severity)
@@ -58,8 +56,8 @@ def implausible(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Ar
     noise = 4.0 * float(np.std(rest, ddof=1))
     if abs(rest.mean()) > REST:
         text = (
-            f"At rest the computed acceleration is {rest.mean() / G0:.3g} g. Is gravity taken off, and the unit of the "
-            "column the one that is given?"
+            f"At rest the computed acceleration is {plain(rest.mean() / G0, 3)} g. Is gravity taken off, and the unit "
+            "of the column the one that is given?"
         )
         yield Reason("sculling.implausible", text.replace(" -", " −"), blocked, severity="doubt")
         return
@@ -68,15 +66,16 @@ def implausible(setup: ScullingSetup, motions: Motions, windows: Mapping[str, Ar
         found = float(y[motions.number == k].mean() - rest.mean())
         if abs(found) > MORE * max(abs(read), abs(stated)) + noise:
             text = (
-                f"At {m.frequency:g} Hz the computed acceleration is {found / read:.3g} of what the accelerometer "
-                "along the vertical reads of the motion, more than with nothing of it taken back. Are frequency (Hz), "
-                "amplitudes (not peak to peak) and acceleration in the units that are given, and the lever arm (size)?"
+                f"At {m.frequency:g} Hz the computed acceleration is {plain(found / read, 3)} of what the "
+                "accelerometer along the vertical reads of the motion, more than with nothing of it taken back. Are "
+                "frequency (Hz), amplitudes (not peak to peak) and acceleration in the units that are given, and the "
+                "lever arm (size)?"
             )
         elif abs(found) > PART * abs(read) + noise and found * stated < 0.0 and abs(stated) > PART * abs(read):
             text = (
-                f"At {m.frequency:g} Hz the computed acceleration is {found / read:.3g} of the reading, the stated "
-                f"filters and algorithm make {stated / read:.3g}. Is the vibration in antiphase (negative), or the "
-                "acceleration positive downwards?"
+                f"At {m.frequency:g} Hz the computed acceleration is {plain(found / read, 3)} of the reading, the "
+                f"stated filters and algorithm make {plain(stated / read, 3)}. Is the vibration in antiphase "
+                "(negative), or the acceleration positive downwards?"
             )
         else:
             continue

@@ -26,7 +26,7 @@ from gyrobench.reduction.setup.run_metadata import Location, with_plan
 from gyrobench.reduction.setup.setups import Setup, weighed
 from gyrobench.reduction.setup.sources import GRAVITY, TIME_BASE, Effect
 from gyrobench.reduction.setup.window_checks import window_problems
-from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Record, told
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Findings, Group, Quantity, Record, plain, told
 from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.system.families.strapdown_motion import FACES
 from gyrobench.units import DEG
@@ -65,7 +65,7 @@ class Motions:
     def names(self) -> list[str]:
         """Return the coefficients: d(5 Hz), with the amplitudes where a frequency has several."""
         alone = len({m.frequency for m in self.motions}) == len(self.motions)
-        sizes = ["" if alone else f", {m.angle / DEG:.4g}°, {m.vibration:.4g} m/s²" for m in self.motions]
+        sizes = ["" if alone else f", {plain(m.angle / DEG, 4)}°, {plain(m.vibration, 4)} m/s²" for m in self.motions]
         return [f"d({m.frequency:g} Hz{x})".replace("-", "−") for m, x in zip(self.motions, sizes, strict=True)]
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.attitudes import POLAR
 from gyrobench.record.record import Record
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import DriftTestResult, Table
 from gyrobench.system.system import OnRequest, Slot
@@ -63,7 +64,7 @@ def tables(windows: Mapping[str, Array], labels: Mapping[int, str], wanted: Sequ
                 for k in (stop, end)
             )
             values.append([label, name, *then, *last])
-    sizes = ", ".join(dict.fromkeys(f"{x / DPH:.3g}" for x in wanted if x > 0.0)) or "none stated"
+    sizes = ", ".join(dict.fromkeys(plain(x / DPH, 3) for x in wanted if x > 0.0)) or "none stated"
     asked = (
         f"Standard deviation wanted of mean and harmonics: {sizes} °/h. Type A only, for the noise that the estimator "
         "is told; NIS is 1 on average where that is right."

@@ -24,7 +24,7 @@ from gyrobench.reduction.drift import drift_terms, harmonic, servo_regression
 from gyrobench.reduction.drift.held_test import HeldSetup, HeldTest
 from gyrobench.reduction.drift.turns import Turns
 from gyrobench.reduction.setup.window_checks import ReductionError
-from gyrobench.reduction.toolkit import Account, Array, Findings, Group, Record, Regression, RunDocument, told
+from gyrobench.reduction.toolkit import Account, Array, Findings, Group, Record, Regression, RunDocument, plain, told
 from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import DPH
 
@@ -104,7 +104,7 @@ class Reduction(HeldTest[PolarSetup]):
         except ReductionError as error:
             h, labels = self.held, self.setup.labels
             turned = [
-                f"{n} {refusals.turned(h.angle_start[self.mine(p)], h.angle_end[self.mine(p)]):.4g}°"
+                f"{n} {plain(refusals.turned(h.angle_start[self.mine(p)], h.angle_end[self.mine(p)]), 4)}°"
                 for p, n in labels.items()
                 if n in POLAR
             ]
@@ -211,7 +211,7 @@ class Reduction(HeldTest[PolarSetup]):
         if whole:
             name, worst = max(whole.items(), key=lambda item: item[1].sigma)
             time = f"below 1/e after {worst.time:g} s" if worst.time is not None else "not below 1/e within a quarter"
-            size = f"{worst.sigma / DPH:.3g} °/h over windows of {worst.dT:g} s ({name})"
+            size = f"{plain(worst.sigma / DPH, 3)} °/h over windows of {worst.dT:g} s ({name})"
             out.append(f"Random drift σ = {size}, correlation {time}.")
         return [*out, found.noise_sentence(), *found.nuisance_sentences(), *live.sentence(self.live)]
 

@@ -21,7 +21,7 @@ import numpy as np
 from gyrobench import drift
 from gyrobench.reduction.drift import composite, drift_terms
 from gyrobench.reduction.estimation import nuisances
-from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Effect, Findings, Quantity, Regression
+from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Effect, Findings, Quantity, Regression, plain
 from gyrobench.result import Coefficient, Table
 from gyrobench.units import DPH
 
@@ -46,7 +46,7 @@ def problems(angles: dict[str, Array]) -> list[str]:
         worst = float(np.max(np.abs(values)))
         if worst > LIMIT:
             found.append(
-                f"{name.partition('_')[0]} angle reaches {math.degrees(worst):.3g}°: levelled it stays within "
+                f"{name.partition('_')[0]} angle reaches {plain(math.degrees(worst), 3)}°: levelled it stays within "
                 f"{math.degrees(LIMIT):g}°; raise the gain from the angle, or reduce without levelled"
             )
     return found

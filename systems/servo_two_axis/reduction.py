@@ -26,7 +26,7 @@ from gyrobench.reduction.drift.held_test import HeldSetup
 from gyrobench.reduction.estimation import nuisances, regression
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.linear_fit import Regression
-from gyrobench.reduction.estimation.sentences import told
+from gyrobench.reduction.estimation.sentences import plain, told
 from gyrobench.reduction.toolkit import Account, Array, DriftReduction, Effect, Findings, Group, Quantity, truth_of
 from gyrobench.result import Coefficient, DriftTestResult, Reason, Table
 from gyrobench.units import DPH
@@ -212,8 +212,8 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
         worst = float(inner[np.argmin(np.cos(inner))])
         if math.cos(worst) < geometry.LEAST:
             found.append(
-                f"gimbal lock: the inner angle reaches {math.degrees(worst):.4g}°, "
-                f"{math.degrees(math.acos(geometry.LEAST)):.3g}° is allowed; leave out the windows beyond"
+                f"gimbal lock: the inner angle reaches {plain(math.degrees(worst), 4)}°, "
+                f"{plain(math.degrees(math.acos(geometry.LEAST)), 3)}° is allowed; leave out the windows beyond"
             )
         found += self._tracking_problems()
         for c, X in self.X.items():
@@ -223,7 +223,7 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
         most = refusals.MOST_SINGLE if np.unique(self.mount).size == 1 else refusals.MOST
         if not found and (k := refusals.condition(self.X)) > most:
             mounts = " ".join(map(str, np.unique(self.mount)))
-            found.append(f"mounts {mounts}: condition {k:.3g}, {most:g} is allowed: add another mount")
+            found.append(f"mounts {mounts}: condition {plain(k, 3)}, {most:g} is allowed: add another mount")
         return found
 
     def reasons(self) -> list[Reason]:
@@ -234,7 +234,8 @@ class Reduction(ChannelTests[TwoAxisServoSetup]):
             return []
         weak = [f"{regression.examine(X, self.setup.names(c)).weakest} ({c})" for c, X in self.X.items()]
         which = " ".join(str(m) for m in dict.fromkeys(self.mount.tolist()))
-        text = f"Mounts {which}: condition {k:.3g} of the coefficients per g; least determined: {', '.join(weak)}."
+        condition = f"Mounts {which}: condition {plain(k, 3)} of the coefficients per g"
+        text = f"{condition}; least determined: {', '.join(weak)}."
         return [Reason("mounts.weak", text)]
 
     def tables(self, coefficients: Sequence[Coefficient]) -> list[Table]:

@@ -22,9 +22,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench import drift
-from gyrobench.arrays import Array
-from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.result import Table
+from gyrobench.reduction.toolkit import Array, Findings, Table, plain
 from gyrobench.system.families.servo_channel import own_name
 from gyrobench.system.values import InvalidValueError, parse_number
 from gyrobench.units import DPH
@@ -102,5 +100,5 @@ def tables(
 
 def sentence(found: Table) -> str:
     """Return how much of the systematic drift is left, rms over the attitudes."""
-    before, after = (float(np.sqrt(np.mean([row[k] ** 2 for row in found.rows]))) for k in (1, 3))
-    return f"Compensation leaves {after:.3g} °/h of a systematic drift of {before:.3g} °/h, rms over the attitudes."
+    before, after = (plain(float(np.sqrt(np.mean([row[k] ** 2 for row in found.rows]))), 3) for k in (1, 3))
+    return f"Compensation leaves {after} °/h of a systematic drift of {before} °/h, rms over the attitudes."

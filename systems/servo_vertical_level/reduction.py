@@ -21,7 +21,7 @@ import numpy as np
 from gyrobench.attitudes import LEVEL, VERTICAL
 from gyrobench.reduction.drift import servo_regression
 from gyrobench.reduction.drift.held_test import HeldSetup, HeldTest
-from gyrobench.reduction.toolkit import Account, Array, Findings, Group, Quantity, Regression, RunDocument, told
+from gyrobench.reduction.toolkit import Account, Array, Findings, Group, Quantity, Regression, RunDocument, plain, told
 from gyrobench.result import Coefficient, Reason, Table
 from gyrobench.units import DPH
 
@@ -54,7 +54,7 @@ class Reduction(HeldTest[LevelSetup]):
             worst = float(np.max(angles[self.mine(p)], initial=0.0))
             if label in LEVEL and worst > refusals.LIMIT * 1.001:
                 found.append(
-                    f"phase {p} ({label}) reaches {math.degrees(worst):.4g}° from level; 1° is the limit of the "
+                    f"phase {p} ({label}) reaches {plain(math.degrees(worst), 4)}° from level; 1° is the limit of the "
                     "small-angle test: shorten the dwell, or start on the other side of level"
                 )
         return found
@@ -143,7 +143,7 @@ class Reduction(HeldTest[LevelSetup]):
         both = [n for n in self.seen.lost if truth.get(n, 0.0)]
         if both and worst > 0.0:
             size = max(abs(truth[n]) for n in both) * worst / DPH
-            text = f"Of {', '.join(both)} angles up to {np.degrees(worst):.2g}° let {size:.1g} °/h in."
+            text = f"Of {', '.join(both)} angles up to {plain(np.degrees(worst))}° let {plain(size, 1)} °/h in."
             found.append(Reason("attitudes.off_level", text))
         return found
 

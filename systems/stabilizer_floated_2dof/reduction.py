@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.reduction.estimation import uncertainty
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops import platform_measures as common
 from gyrobench.reduction.loops.loop_summary import DRIFTS, isolation, margins
 from gyrobench.reduction.loops.loop_toolkit import Account, Gate, LoopReduction, Point, drift, told
@@ -137,7 +138,7 @@ class Reduction(LoopReduction):
         values = measured_values(points, found.excluded["stabilizer"]) if points else {}
         pm = values.get("phase")
         if pm is not None and pm[0] < ENOUGH and not found.unstable:
-            text = f"The phase margin is {pm[0]:.3g}°; more than {ENOUGH:g}° is wanted [GSP ch. 5]."
+            text = f"The phase margin is {plain(pm[0], 3)}°; more than {ENOUGH:g}° is wanted [GSP ch. 5]."
             found.warn("loop.phase_margin", text)
         if "crossover" in values and max(p.f for p in points) > 1.25 * values["crossover"][0]:
             f = values["crossover"][0]

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.loop_drift import Drift, drift
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_toolkit import DRIFTS, Account, LoopReduction, Table, isolation, margins, told
@@ -88,8 +89,8 @@ class Reduction(LoopReduction):
 
     def _stable(self) -> str:
         return (
-            f"Both loops together are stable up to a correction of {self.axes.limit():.4g} N·m/rad, one axis alone up "
-            f"to {one_axis_limit(**self.gyro):.4g}."
+            f"Both loops together are stable up to a correction of {plain(self.axes.limit(), 4)} N·m/rad, one axis "
+            f"alone up to {plain(one_axis_limit(**self.gyro), 4)}."
         )
 
     def _load(self, gate: Gate, axis: int) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.loop_summary import isolation, margins
 from gyrobench.reduction.loops.loop_toolkit import Account, Gate, LoopFindings, LoopReduction, told, trace
 from gyrobench.reduction.loops.platform_measures import level_drift
@@ -73,7 +74,7 @@ class Reduction(LoopReduction):
             conventions=[
                 "alpha is the inertial angle of the platform, beta the angle of the float in its case; both positive "
                 "for a positive torque.",
-                f"The closed forms hold cos(beta), here at its mean over the load, {held:.6g}: H stands for "
+                f"The closed forms hold cos(beta), here at its mean over the load, {plain(held, 6)}: H stands for "
                 "H cos(beta).",
                 "u: scatter of the fit and, as a rectangular distribution, what the exchange once a step may do.",
             ],
@@ -90,23 +91,24 @@ class Reduction(LoopReduction):
         if ends is None:
             return []
         gate, p = self.load, self.plant
-        beside = f" (closed form {ends.closed:.4g} arcmin)" if ends.closed is not None else ""
+        beside = f" (closed form {plain(ends.closed, 4)} arcmin)" if ends.closed is not None else ""
         return [
             *margins(self.found),
             *isolation(self.found, "isolation", "platform.attitude"),
             *told(
                 self.found.coefficients,
-                f"After {gate.t[-1] - gate.t[0]:.4g} s of {p.M:g} N·m the platform leans by {{a(T)}}{beside}.",
-                f"The float then stands at {math.degrees(gate['gyro.b'][-1]):.3g}°; it was never beyond {{b_max}}.",
+                f"After {plain(gate.t[-1] - gate.t[0], 4)} s of {p.M:g} N·m the platform leans by {{a(T)}}{beside}.",
+                f"The float then stands at {plain(math.degrees(gate['gyro.b'][-1]), 3)}°; it was never beyond "
+                f"{{b_max}}.",
                 SAID[self.kind](p) if self.free else "",
             ),
         ]
 
 
 SAID = {
-    "integrating": lambda p: f"The gyro holds the axis like a spring of {p.stiffness:.4g} N·m/rad.",
-    "rate-integrating": lambda p: f"The axis creeps with M C/H² = {p.M * p.C / p.H**2 / ARCMIN:.4g} arcmin/s.",
-    "rate": lambda p: f"The axis feels like an inertia of {p.inertia:.5g} kg·m² instead of {p.J0:.5g}.",
+    "integrating": lambda p: f"The gyro holds the axis like a spring of {plain(p.stiffness, 4)} N·m/rad.",
+    "rate-integrating": lambda p: f"The axis creeps with M C/H² = {plain(p.M * p.C / p.H**2 / ARCMIN, 4)} arcmin/s.",
+    "rate": lambda p: f"The axis feels like an inertia of {plain(p.inertia, 5)} kg·m² instead of {plain(p.J0, 5)}.",
 }
 
 

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup.setups import Setup
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.reduction.toolkit import Account, DriftReduction, Effect, Findings, Group, Quantity, Regression, told
@@ -195,7 +196,7 @@ class Reduction(DriftReduction[AlignmentSetup]):
             return []
         text = (
             f"Errors of the theodolite are taken to first order; of {', '.join(large)} the squares are "
-            f"{max(abs(float(x)) for x in sizes.values()) ** 2 / ARCSEC:.2g}″ and not in u: adjust it."
+            f"{plain(max(abs(float(x)) for x in sizes.values()) ** 2 / ARCSEC)}″ and not in u: adjust it."
         )
         return [Reason("theodolite.large_errors", text, ("pass",), ("about p × east", *fitted))]
 
@@ -219,5 +220,5 @@ class Reduction(DriftReduction[AlignmentSetup]):
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:
         return [
             *told(coefficients, "Axis off the pole: {about east} about east, {about p × east} across."),
-            f"Residual standard deviation {found.residual_std:.3g}″ of a sight.",
+            f"Residual standard deviation {plain(found.residual_std, 3)}″ of a sight.",
         ]

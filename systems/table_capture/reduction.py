@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.loop_toolkit import ARCSEC, Account, Array, LoopReduction, ReductionError, told, trace
 
 SERVO = 2.0  # phase of the plan
@@ -35,7 +36,7 @@ class Reduction(LoopReduction):
         reached = float(t[outside[-1] + 1]) if outside.size and outside[-1] + 1 < t.size else None
         closed, none = (float(t[np.argmax(fine)]), "") if fine.any() else (None, "the fine loop is not closed")
         found.measure("t_fine", "time until the fine loop is closed", "s", closed, u, no_value=none)
-        meaning = f"time to null, within {null / ARCSEC:.3g}″"
+        meaning = f"time to null, within {plain(null / ARCSEC, 3)}″"
         found.measure("t_null", meaning, "s", reached, u, unsettled=why, limit=(None, limit))
         past, u_past = _peak(-angle * np.sign(angle[0]))
         meaning = "largest table angle beyond null"
@@ -89,13 +90,13 @@ def _unsettled(t: Array, angle: Array, fine: NDArray[np.bool_], limited: NDArray
     worst = float(np.max(np.abs(angle[late])))
     largest = math.degrees(worst)
     if not fine.any():
-        return f"the capture does not end: after {t[-1]:.3g} s the table is {largest:.3g}° from null"
+        return f"the capture does not end: after {plain(t[-1], 3)} s the table is {plain(largest, 3)}° from null"
     if worst <= null:
         return ""
     share = 100.0 * float(np.mean(limited[late]))
     if share > 10.0:
         return (
-            f"the loop does not settle: at the end it swings by {largest:.3g}°, with the motor at its limit for "
+            f"the loop does not settle: at the end it swings by {plain(largest, 3)}°, with the motor at its limit for "
             f"{share:.0f} % of the time, which lowers the gain of a conditionally stable loop below its lower limit"
         )
-    return f"the table does not stay at null: at the end it is up to {largest * 3600.0:.3g}″ away"
+    return f"the table does not stay at null: at the end it is up to {plain(largest * 3600.0, 3)}″ away"

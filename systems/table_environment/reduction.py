@@ -23,6 +23,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.linear_fit import Regression
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup.run_metadata import Location, number
 from gyrobench.reduction.setup.window_checks import window_problems
 from gyrobench.reduction.toolkit import Account, DriftReduction, Effect, Findings, Group, Quantity, SiteSetup, told
@@ -199,9 +200,10 @@ class Reduction(DriftReduction[EnvironmentSetup]):
         rss, spread = (100.0 * x / self.averaging for x in (self.mode.rss, self.mode.spread))
         return [
             *told(coefficients, *(f"{c.meaning[:1].upper()}{c.meaning[1:]}: {{{c.name}}}." for c in acted_on)),
-            f"Surroundings of the later tests: {level[0]:.2g} °/h (root of squares; Monte Carlo {level[1]:.2g}).",
-            f"Misalignment at {float(self.setup.options['turning']):g} ERU: {align[0]:.2g} °/h (Monte Carlo "
-            f"{align[1]:.2g}); rate over {math.degrees(self.averaging):g}°: {rss:.2g} % (Monte Carlo {spread:.2g} %).",
+            f"Surroundings of the later tests: {plain(level[0])} °/h (root of squares; Monte Carlo {plain(level[1])}).",
+            f"Misalignment at {float(self.setup.options['turning']):g} ERU: {plain(align[0])} °/h (Monte Carlo "
+            f"{plain(align[1])}); rate over {math.degrees(self.averaging):g}°: {plain(rss)} % (Monte Carlo "
+            f"{plain(spread)} %).",
         ]
 
 

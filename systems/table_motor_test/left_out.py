@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg, special
 
-from gyrobench.arrays import Array
+from gyrobench.reduction.toolkit import Array, plain
 
 LEVEL = 1e-3  # of all terms together
 
@@ -79,7 +79,7 @@ def sentence(sought: Sequence[Sought]) -> str:
     first = sought[0]
     if first.p >= LEVEL / len(sought):
         return ""
-    size = f"{first.size:.2g} ± {1.96 * first.u:.1g} {first.term.unit}"
+    size = f"{plain(first.size)} ± {plain(1.96 * first.u, 1)} {first.term.unit}"
     return (
         f"What the model leaves holds a {first.term.meaning}, {size} (95 %), which is not in it: K, J, D, M_C and c "
         f"may be wrong by more than their u. {first.term.remedy}"

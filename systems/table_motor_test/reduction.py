@@ -26,7 +26,7 @@ from scipy import integrate, linalg, optimize, special
 
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_toolkit import ARCSEC, Account, Array, Gate, LoopReduction, Table, told
-from gyrobench.reduction.setup.window_checks import ReductionError
+from gyrobench.reduction.toolkit import ReductionError, plain
 
 from . import left_out
 from .windows import ANGLE, CURRENT, PIECE, SLOW, VOLTAGE, Window, apart, bands, cut, meter_bands, reading_noise
@@ -172,8 +172,8 @@ class Reduction(LoopReduction):
             rows.append([name, int(r.size), float(np.sqrt(np.mean(r**2))) if r.size else None])
         caption = (
             f"Windows of {2.0 * PIECE:g} s. From the residuals: random torque on the axis "
-            f"{mechanics.torque_density:.2g} N·m/√Hz, standard deviation of an angle "
-            f"{mechanics.angle_error / ARCSEC:.2g}″."
+            f"{plain(mechanics.torque_density)} N·m/√Hz, standard deviation of an angle "
+            f"{plain(mechanics.angle_error / ARCSEC)}″."
         )
         columns = ["phase", "windows", "rms of the residual / (rad/s²)"]
         sought = [[s.term.meaning, s.size, s.u, s.term.unit, s.p] for s in mechanics.left_out]

@@ -16,6 +16,7 @@ from itertools import combinations
 import numpy as np
 from scipy import special
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.loop_toolkit import ARCSEC, Array
 from gyrobench.reduction.loops.scale_errors import waves
 
@@ -38,8 +39,8 @@ def contradicted(r: Readings) -> str:
     cures = [words for p_cure, words in reversed(ways) if p_cure > AGREES][:3]
     text = (
         f"Polygon and second head contradict each other in what both tell of the position: {name} is "
-        f"{by_polygon[k] / ARCSEC:.3g}″ by the autocollimator and {by_heads[k] / ARCSEC:.3g}″ by the heads "
-        f"(p {'< 0.001' if p < 1e-3 else f'= {p:.3g}'})."
+        f"{plain(by_polygon[k] / ARCSEC, 3)}″ by the autocollimator and {plain(by_heads[k] / ARCSEC, 3)}″ by the heads "
+        f"(p {'< 0.001' if p < 1e-3 else f'= {plain(p, 3)}'})."
     ).replace("-", "−")
     if cures:
         return f"{text} They agree with {', or '.join(cures)}: was that mistaken?"

@@ -21,7 +21,7 @@ from scipy import special
 
 from gyrobench.reduction.loops.loop_toolkit import ARCSEC, Account, MeasureReduction, ReductionError, told
 from gyrobench.reduction.loops.scale_errors import truth, waves
-from gyrobench.reduction.setup.window_checks import window_problems
+from gyrobench.reduction.toolkit import plain, window_problems
 from gyrobench.result import BudgetLine, Series, Table
 
 from .contradiction import contradicted, misplaced
@@ -147,7 +147,7 @@ class Reduction(MeasureReduction):
         return told(
             self.found.coefficients,
             f"Largest position error, at {self.where:g}°: {{accuracy}}.",
-            f"Repeatability {{repeatability}}; one count is {count:.2g}″.",
+            f"Repeatability {{repeatability}}; one count is {plain(count)}″.",
             f"Orders told from the polygon: {', '.join(map(str, self.orders)) or 'none'}.",
         )
 

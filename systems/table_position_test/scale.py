@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis.unshown import ARRANGEMENT, TOO_LARGE
 from gyrobench.reduction.loops.measure_findings import MeasureFindings
-from gyrobench.result import Reason
+from gyrobench.reduction.toolkit import Reason, RunDocument, plain
 
 from .sources import SCALE
 
@@ -20,7 +19,7 @@ def unstated(run: RunDocument, slopes: Mapping[str, float], found: MeasureFindin
     far = sorted((n for n, v in moved.items() if v > 1.0), key=lambda n: -moved[n])
     if not far:
         return
-    said = ", ".join(f"{n} by {moved[n]:.2g} u" for n in far[:3])
+    said = ", ".join(f"{n} by {plain(moved[n])} u" for n in far[:3])
     text = (
         f"No residual of this record would show: the scale of the autocollimator wrong by 2 % ({said}). State its "
         "uncertainty (u_scale), or that units and scales were checked (arrangement = checked)."

@@ -9,15 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
-from gyrobench.arrays import Array
 from gyrobench.frames import EARTH_RATE as ERU
-from gyrobench.record.record import Record
-from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis.unshown import ARRANGEMENT
 from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.loops.loop_toolkit import ARCSEC, Account, MeasureReduction, line, over_time, told, trace
-from gyrobench.reduction.setup.sources import Source
-from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
+from gyrobench.reduction.toolkit import Array, Record, ReductionError, RunDocument, Source, plain, window_problems
 from gyrobench.result import BudgetLine, Reason, Response, Table
 
 from .axis_as_data import SampledLoopError, margins_table
@@ -148,18 +144,18 @@ class Reduction(MeasureReduction):
             raise ReductionError("no phase has three windows: nothing to reduce")
         self.rates = sorted({abs(r.rate) for r in self.readings})
         pairs = {rate: [r for r in self.readings if abs(r.rate) == rate] for rate in self.rates}
-        self.ranked_by = f"ripple {self.rates[-1] / ERU:.6g} ERU"
+        self.ranked_by = f"ripple {plain(self.rates[-1] / ERU, 6)} ERU"
         clock, u, k = time_base(pairs, self.quantum)
         true = run.parameters.get("command.reference_clock")
         found.measure("time base", "relative error of the command's time base, all rates", "1e-6", clock, u, scale=PPM,
                       k=k, truth=None if true is None else float(true))  # fmt: skip
         for rate, both in pairs.items():
-            self._error(f"error {rate / ERU:.6g} ERU", both)
+            self._error(f"error {plain(rate / ERU, 6)} ERU", both)
         self._noise(pairs)
         self._scales()
         for rate, both in pairs.items():
             sizes, u_each = zip(*(r.ripple for r in both), strict=True)
-            found.measure(f"ripple {rate / ERU:.6g} ERU", "standard deviation of the tracking error", "arcsec",
+            found.measure(f"ripple {plain(rate / ERU, 6)} ERU", "standard deviation of the tracking error", "arcsec",
                           _rms(np.array(sizes)), math.hypot(*u_each) / len(both), scale=ARCSEC)  # fmt: skip
         rows = [self._row(r) for r in self.readings]
         self._axis()
@@ -191,11 +187,11 @@ class Reduction(MeasureReduction):
     def summary(self) -> list[str]:
         worst = max(self.readings, key=lambda r: abs(r.mean) + 2.0 * r.ripple[0])
         largest, at = abs(worst.mean) + 2.0 * worst.ripple[0], f"{worst.rate / ERU:+.6g}".replace("-", "−")
-        span = f"{self.rates[0] / ERU:.4g} to {self.rates[-1] / ERU:.6g} ERU"
+        span = f"{plain(self.rates[0] / ERU, 4)} to {plain(self.rates[-1] / ERU, 6)} ERU"
         return told(
             self.found.coefficients,
             f"Time base of the command, from {len(self.readings)} runs at {span}: {{time base}}.",
-            f"Largest tracking error (mean and two standard deviations) {largest / ARCSEC:.2g}″, at {at} ERU (1.5″ "
+            f"Largest tracking error (mean and two standard deviations) {plain(largest / ARCSEC)}″, at {at} ERU (1.5″ "
             "allowed).",
         )
 
@@ -229,12 +225,13 @@ class Reduction(MeasureReduction):
         for rate, both in pairs.items():
             squares, dof = (sum(x) for x in zip(*(r.scatter for r in both), strict=True))
             if float(special.chdtrc(dof, squares / (self.quantum**2 / 12.0))) < BEYOND:
-                names.append(f"error {rate / ERU:.6g} ERU")
+                names.append(f"error {plain(rate / ERU, 6)} ERU")
                 sizes.append(math.sqrt(squares / dof) / ARCSEC)
         text = (
-            f"Angles at the ends of windows scatter by up to {max(sizes, default=0.0):.2g}″ about their line, rounding "
-            f"makes {self.quantum / math.sqrt(12.0) / ARCSEC:.2g}″: the table moves, or its reader is noisy, which is "
-            "not in u of the mean rates. State the noise of a reading (u_reading), if only as an upper limit."
+            f"Angles at the ends of windows scatter by up to {plain(max(sizes, default=0.0))}″ about their line, "
+            f"rounding makes {plain(self.quantum / math.sqrt(12.0) / ARCSEC)}″: the table moves, or its reader is "
+            "noisy, which is not in u of the mean rates. State the noise of a reading (u_reading), if only as an "
+            "upper limit."
         )
         if names:
             self.found.reasons.append(
@@ -254,7 +251,7 @@ class Reduction(MeasureReduction):
         }
         if not moved:
             return
-        said = ", ".join(f"{n} by {moved[n]:.2g} u" for n in sorted(moved, key=lambda n: -moved[n])[:3])
+        said = ", ".join(f"{n} by {plain(moved[n])} u" for n in sorted(moved, key=lambda n: -moved[n])[:3])
         text = (
             f"No residual of this record would show: the times wrong by 2 %; the angles wrong by 2 % ({said}). "
             "State that units and scales were checked (arrangement = checked)."
@@ -300,7 +297,7 @@ class Reduction(MeasureReduction):
         loop = SampledLoop.of(run.parameters, run.step)
         if loop is not None:
             exact = loop.ramp(change, float(run.parameters["command.reference_acceleration"]), RAMP)
-            meaning = f"largest torque demanded at the change of rate by {abs(change) / ERU:.6g} ERU"
+            meaning = f"largest torque demanded at the change of rate by {plain(abs(change) / ERU, 6)} ERU"
             most, closed = (float(np.max(np.abs(x))) for x in (torque, exact[2]))
             self.found.measure("peak torque", meaning, "N.m", most, loop.count_torque(self.quantum), closed=closed)
             figure = replace(figure, curves=[line("linear loop without counts", exact[0], exact[1] / ARCSEC)])

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.record.record import Record
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.loop_drift import Drift, drift
 from gyrobench.reduction.loops.loop_toolkit import Account, Array, Gate, LoopReduction, Point, Table, margins, told
 from gyrobench.reduction.loops.margins import measured_values
@@ -105,7 +106,7 @@ class Reduction(LoopReduction):
             shown = None if closed is None else closed / ARCSEC
             rows.append([gate.amplitude / GCM, step.change / ARCSEC, u / ARCSEC, shown])
             if gate.label == "torque 1 M":
-                meaning = f"table angle under {gate.amplitude:.4g} N·m"
+                meaning = f"table angle under {plain(gate.amplitude, 4)} N·m"
                 found.measure("θ(M)", meaning, "″", step.change, u, scale=ARCSEC, closed=closed, unsettled=why)
                 self._float(gate)
         if not moved:
@@ -124,7 +125,7 @@ class Reduction(LoopReduction):
     def _float(self, gate: Gate) -> None:
         step = self.found.step(gate, "gyro.b", scale=ARCSEC, unit="″", y_name="float angle", quiet=self.hold)
         closed = None if self.loop is None else gate.amplitude / (self.loop.gain * self.loop.K_g)
-        self.found.measure("b(M)", f"float angle under {gate.amplitude:.4g} N·m", "″", step.change, step.u_change,
+        self.found.measure("b(M)", f"float angle under {plain(gate.amplitude, 4)} N·m", "″", step.change, step.u_change,
                            scale=ARCSEC, closed=closed, unsettled=step.unsettled)  # fmt: skip
 
     def _square_law(self) -> None:
@@ -139,7 +140,7 @@ class Reduction(LoopReduction):
         if forth is None or back is None:
             return
         closed = None if loop is None else math.sqrt(abs(forth[0]) * loop.torque_max) / (loop.gain * loop.K_g)
-        self.found.measure("b(M)", f"float angle under {forth[0]:.4g} N·m, without root shaper", "″",
+        self.found.measure("b(M)", f"float angle under {plain(forth[0], 4)} N·m, without root shaper", "″",
                            0.5 * (forth[1] - back[1]), 0.5 * math.hypot(forth[2], back[2]), scale=ARCSEC,
                            closed=closed)  # fmt: skip
 
@@ -157,8 +158,8 @@ class Reduction(LoopReduction):
             for f, g in loop.limits()
         ]
         caption = (
-            f"All phase crossovers of L (python-control); phase margin {loop.phase_margin():.3g}° at "
-            f"{loop.w_c / (2.0 * math.pi):.4g} Hz. A loop with a factor below 1 is conditionally stable."
+            f"All phase crossovers of L (python-control); phase margin {plain(loop.phase_margin(), 3)}° at "
+            f"{plain(loop.w_c / (2.0 * math.pi), 4)} Hz. A loop with a factor below 1 is conditionally stable."
         )
         columns = ["phase crossover / Hz", "factor on the gain", "factor / dB", "unstable 5 % above it"]
         found.tables.append(Table("loop.limits", "Gain limits of the closed form", caption, columns, rows))
@@ -166,7 +167,7 @@ class Reduction(LoopReduction):
         if loop.network in (3, 4) and loop.w_c < 2.0 * resonance:
             text = (
                 "The crossover is below twice the resonance of table and float, "
-                f"{resonance / (2.0 * math.pi):.3g} Hz: the loop is poorly damped. Raise the crossover."
+                f"{plain(resonance / (2.0 * math.pi), 3)} Hz: the loop is poorly damped. Raise the crossover."
             )
             found.warn("loop.poorly_damped", text)
 
@@ -186,7 +187,7 @@ class Reduction(LoopReduction):
             closed = abs(complex(model[0]))
         elif self.loop is not None and self.shaper:
             closed = abs(self.loop.compliance(2j * math.pi * worst.f))
-        meaning = f"table angle per torque at {worst.f:.4g} Hz, the largest measured"
+        meaning = f"table angle per torque at {plain(worst.f, 4)} Hz, the largest measured"
         size = abs(worst.value)
         found.measure("compliance", meaning, "″/(N·m)", size, size * (worst.u or 0.0), scale=ARCSEC, closed=closed)
 

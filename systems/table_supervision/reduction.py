@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from gyrobench.packaging.loading import load_part
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.estimation.uncertainty import clopper_pearson, poisson_interval
 from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, ReductionError, Table, told
 
@@ -122,7 +123,7 @@ class Reduction(MeasureReduction):
             f"Found: {'all' if seen == n else f'{seen} of'} {n} faults; named rightly: "
             f"{int((self.seen & self.named).sum())}.",
             *told(self.found.coefficients, f"Slowest to find: {slowest[2:]}, {{{slowest}}}." if slowest else ""),
-            f"False alarms: {self.count} in {self.quiet:.4g} s without faults (95 %: {low:g} to {high:g} 1/h).",
+            f"False alarms: {self.count} in {plain(self.quiet, 4)} s without faults (95 %: {low:g} to {high:g} 1/h).",
         ]
 
 

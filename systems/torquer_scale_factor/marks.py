@@ -12,9 +12,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrobench.arrays import Array
 from gyrobench.record.run_document import PlanRow
-from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
+from gyrobench.reduction.toolkit import Array, ReductionError, plain, window_problems
 
 SHARED = 0.5  # of the range turned, least part that both senses must cover
 
@@ -44,7 +43,7 @@ def rows(windows: Mapping[str, Array], plan: Sequence[PlanRow]) -> dict[str, Arr
         if not high - low > SHARED * least or any(np.any(s * np.diff(a) <= 0.0) for s, (_, a, _) in curves.items()):
             problems.append(
                 f"{size * 1e3:g} mA: the two senses do not turn the table back over the same angles (shared "
-                f"{math.degrees(high - low):.3g}°): drift larger than the precession, crossed wires or lost lock"
+                f"{plain(math.degrees(high - low), 3)}°): drift larger than the precession, crossed wires or lost lock"
             )
             continue
         rate = {s: _rate(t, s * a, s * low, s * high) for s, (t, a, _) in curves.items()}

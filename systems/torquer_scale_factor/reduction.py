@@ -33,7 +33,7 @@ from gyrobench.reduction.estimation.effects import correction_table, simulated_t
 from gyrobench.reduction.estimation.fit_result import TYPE_A, budget_lines, changes_by_source
 from gyrobench.reduction.estimation.truth_check import compared
 from gyrobench.reduction.setup.sources import TIME_BASE
-from gyrobench.reduction.toolkit import Account, Array, Location, Record, ReductionError, told
+from gyrobench.reduction.toolkit import Account, Array, Location, Record, ReductionError, plain, told
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Reason, Series, Table, Test
 from gyrobench.system.families.servo_channel import OTHER, own_name
 
@@ -249,7 +249,7 @@ class Reduction:
         off, off_printed = (self.marked - mean) / mean, (self.marked / KU - printed) / printed
         columns = (i / MA, self.plus / DPH, self.minus / DPH, self.marked / KU, off * 100.0, off_printed * 100.0,
                    self.half / DPH)  # fmt: skip
-        caption = f"Linearity against K = {mean / KU:.6g} and, as in Hu 1981, against {printed:.3f} °/h/mA"
+        caption = f"Linearity against K = {plain(mean / KU, 6)} and, as in Hu 1981, against {printed:.3f} °/h/mA"
         head = ["current / mA", "rate + / (°/h)", "rate − / (°/h)", "K_n / (°/h/mA)", "linearity / %",
                 "linearity, K rounded / %", "drift / (°/h)"]  # fmt: skip
         rows = np.column_stack(columns).tolist()

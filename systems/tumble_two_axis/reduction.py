@@ -24,7 +24,7 @@ from gyrobench.reduction.drift.drift_terms import OneLoopSetup
 from gyrobench.reduction.drift.rest_test import SMALL, RestTest
 from gyrobench.reduction.setup import sources
 from gyrobench.reduction.setup.window_checks import ReductionError, window_problems
-from gyrobench.reduction.toolkit import Account, Array, Effect, Findings, Group, RunDocument
+from gyrobench.reduction.toolkit import Account, Array, Effect, Findings, Group, RunDocument, plain
 from gyrobench.result import Harmonic, Table
 from gyrobench.units import DPH
 
@@ -81,8 +81,8 @@ class Reduction(RestTest[TwoAxisSetup]):
             if bad.size:
                 found.append(
                     f"row {int(bad[0]) + 1}{f' and {bad.size - 1} more' if bad.size > 1 else ''}: the {axis} axis "
-                    f"moves by {math.degrees(moved[bad[0]]):.3g}° while the current is averaged; its rate enters the "
-                    "reading: average at rest only"
+                    f"moves by {plain(math.degrees(moved[bad[0]]), 3)}° while the current is averaged; its rate enters "
+                    "the reading: average at rest only"
                 )
         pairs = zip(w["outer_start"], w["inner_start"], strict=True)
         places = {tuple(round(float(a) % TURN, 3) % round(TURN, 3) for a in pair) for pair in pairs}
@@ -138,7 +138,7 @@ class Reduction(RestTest[TwoAxisSetup]):
         why = geometry.harmonic_problems(s.latitude, s.m, s.n, places.size)
         off = float(np.max(np.abs(np.angle(np.exp(1j * (self.angles[1] - s.n * theta))))))
         if off > 1e-3:
-            why.append(f"the inner angle is not {s.n}/{s.m} of the outer: off by up to {math.degrees(off):.3g}°")
+            why.append(f"the inner angle is not {s.n}/{s.m} of the outer: off by up to {plain(math.degrees(off), 3)}°")
         gaps = np.diff(np.append(places, places[0] + TURN))
         each = [int(np.sum(np.abs(np.angle(np.exp(1j * (at - p + 1e-5)))) < 1e-3)) for p in places]
         if np.ptp(gaps) > 1e-3 or len(set(each)) > 1:

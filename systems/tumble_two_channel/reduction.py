@@ -27,7 +27,7 @@ from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.setup.run_metadata import Location, number, truth_of
 from gyrobench.reduction.setup.setups import TurningSetup, scale_factor_problems
 from gyrobench.reduction.setup.sources import TURNED
-from gyrobench.reduction.toolkit import Account, Array, Findings, Quantity, RunDocument, window_problems
+from gyrobench.reduction.toolkit import Account, Array, Findings, Quantity, RunDocument, plain, window_problems
 from gyrobench.result import Coefficient, Reason, Table
 from gyrobench.units import DPH
 
@@ -195,7 +195,7 @@ class Reduction(ChannelTests[TwoChannelSetup]):
 
 def _conventions(s: TwoChannelSetup) -> list[str]:
     sign = "k i = ω_IA − ω_d" if s.polarity == "project" else "k i = ω_d − ω_IA as in Hu 1981, sign inverted at entry"
-    k = {a: f"{v * 1e-3 / DPH:.6g} °/h/mA" for a, v in s.k.items()}
+    k = {a: f"{plain(v * 1e-3 / DPH, 6)} °/h/mA" for a, v in s.k.items()}
     simple = ["Terms outside the simple model are taken as zero."]
     squares = ["Dx_yy and Dy_xx are taken as zero; if not, Dx_0 holds γ² Dx_yy, Dx_xx and Dx_zz hold −Dx_yy; y alike."]
     return [

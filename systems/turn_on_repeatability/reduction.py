@@ -39,6 +39,7 @@ from gyrobench.reduction.toolkit import (
     RunDocument,
     Setup,
     Table,
+    plain,
     told,
     window_problems,
 )
@@ -111,8 +112,8 @@ class Reduction(DriftReduction[TurnOnSetup]):
             return []
         own, other = float(np.median(since)), float(np.median(step))
         return [
-            f"since: it grows by {own:.4g} s from a reading to the next one of a turn-on, the times by {other:.4g} s: "
-            "a unit is mistaken, or rows"
+            f"since: it grows by {plain(own, 4)} s from a reading to the next one of a turn-on, the times by "
+            f"{plain(other, 4)} s: a unit is mistaken, or rows"
         ]
 
     def _read(self) -> None:
@@ -239,7 +240,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
     def _time(self, truth: float | None) -> Coefficient | None:
         """Return the time until the bias is within the limit; its interval by the warm-ups that the record allows."""
         q, longest = self.tau.size, self.longest
-        meaning = f"time until the bias is within {self.setup.limit / DPH:.4g} °/h of that when warm"
+        meaning = f"time until the bias is within {plain(self.setup.limit / DPH, 4)} °/h of that when warm"
         if not q:
             return None
         value = self.found.value
@@ -388,7 +389,7 @@ class Reduction(DriftReduction[TurnOnSetup]):
         names = {c.name for c in coefficients if not c.no_value}
         said = {
             "σ_on": "Repeatability of the bias from turn-on to turn-on {σ_on}.", "σ_day": "From day to day {σ_day}.",
-            "t_w": f"Within {self.setup.limit / DPH:.4g} °/h after {{t_w}}.",
+            "t_w": f"Within {plain(self.setup.limit / DPH, 4)} °/h after {{t_w}}.",
         }  # fmt: skip
         sentences = told(coefficients, *(text for n, text in said.items() if n in names))
         return [*sentences, found.noise_sentence("readings")]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gyrobench.arrays import Array
-from gyrobench.result import Reason
+from gyrobench.reduction.toolkit import Array, Reason, plain
 from gyrobench.units import DPH
 
 ALIKE = (
@@ -38,8 +37,8 @@ def extrapolated(left: Array, read: float, limit: float) -> list[Reason]:
     if most <= limit:
         return []
     text = (
-        f"When the readings of a turn-on end, after {read:.4g} s, the bias may still be off by {most / DPH:.3g} °/h, "
-        f"more than the limit of {limit / DPH:.4g} °/h. The bias when warm and the time until then are continued along "
-        "exponentials; a slower part would change them. Read longer."
+        f"When the readings of a turn-on end, after {plain(read, 4)} s, the bias may still be off by "
+        f"{plain(most / DPH, 3)} °/h, more than the limit of {plain(limit / DPH, 4)} °/h. The bias when warm and the "
+        "time until then are continued along exponentials; a slower part would change them. Read longer."
     )
     return [Reason("warm_up.extrapolated", text, severity="warning")]

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from gyrobench.arrays import Array
 from gyrobench.reduction.drift.late_temperature import following
-from gyrobench.result import Coefficient
+from gyrobench.reduction.toolkit import Array, Coefficient, plain
 from gyrobench.units import DPH
 
 LAGS = (0.3, 1.0, 3.0, 10.0)  # time constants, of the time for which a turn-on is read
@@ -41,7 +40,7 @@ def coefficient(slope: tuple[float, float], dof: int, longest: float, late: bool
     """Return b_T.  slope: with its u, rad/s/K; longest: time to the end of the last reading of a turn-on, s."""
     k, u = (x / DPH for x in slope)
     true = None if truth is None else truth / DPH
-    meaning = f"change of the bias with temperature, of turn-ons of {longest:.4g} s"
+    meaning = f"change of the bias with temperature, of turn-ons of {plain(longest, 4)} s"
     factor = float(special.stdtrit(dof, 0.975))
     if late:
         interval = -math.inf, math.inf

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from gyrobench.record.record import Record
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.loop_toolkit import ARCMIN, DEG, Account, Array, Gate, LoopReduction, Table, trace
 from gyrobench.units import G0
 
@@ -100,7 +101,7 @@ class Reduction(LoopReduction):
         )
 
     def _figures(self, t: Array, tilt: Array, shown: Array, first: int) -> None:
-        when = f"from {t[first]:.4g} s on, after the erection" if 0 < first < t.size else "over the whole run"
+        when = f"from {plain(t[first], 4)} s on, after the erection" if 0 < first < t.size else "over the whole run"
         axis = "Angle between the rotor axis and the true vertical"
         drawn = [("erection", "tilt", slice(first + 1), tilt, f"{axis} while it is erected.")] if first else []
         if first < t.size:
@@ -128,8 +129,8 @@ class Reduction(LoopReduction):
         found.measure("t_zone", meaning, "s", inside, float(t[1] - t[0]) / math.sqrt(12.0), closed=closed)
         if inside is None:
             text = (
-                f"The rotor did not reach the dead zone in {t[-1]:.4g} s: at its end it leans by "
-                f"{tilt[-1] / ARCMIN:.4g} arcmin."
+                f"The rotor did not reach the dead zone in {plain(t[-1], 4)} s: at its end it leans by "
+                f"{plain(tilt[-1] / ARCMIN, 4)} arcmin."
             )
             found.warn("erection.not_erected", text)
 
@@ -147,7 +148,8 @@ class Reduction(LoopReduction):
         limited = np.flatnonzero(np.abs(leans).max(axis=1) > self.rate / self.gain)
         free = int(limited[-1]) + 1 if limited.size else 0
         if free > len(leans) - FITTED:
-            why = f"the law is at its largest rate up to {gate.t[min(free, len(leans) - 1)]:.4g} s: take a longer time"
+            end = plain(gate.t[min(free, len(leans) - 1)], 4)
+            why = f"the law is at its largest rate up to {end} s: take a longer time"
             self.found.measure("hang-off", SETTLED, "arcmin", None, scale=ARCMIN, unsettled=why)
             return
         t, leans = gate.t[free:] - gate.t[free], leans[free:]

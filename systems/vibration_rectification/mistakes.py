@@ -7,13 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy import special
 
-from gyrobench.arrays import Array
-from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis.handling_candidates import changed, exchanged_rows, other_times
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate
 from gyrobench.reduction.diagnosis.scale_mistakes import FORCES, factor_sentence
-from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.result import Coefficient, Reason
+from gyrobench.reduction.toolkit import Array, Coefficient, Findings, Reason, Record, plain
 
 NOTHING = 0.1  # of gravity, up less down: not that axis, or not turned over; a unit of a thousandth is below it, too
 CHANGED, DRIFTS = 1e-6, 0.05  # probabilities by chance: constants of the positions, slopes within them
@@ -37,7 +34,7 @@ def same_both_ways(found: Sequence[Coefficient], vertical: float) -> Iterator[Re
     for c in found:
         if c.name == "G" and abs(c.estimate + vertical) < 3.0 * c.u < 0.05 * abs(vertical):
             text = (
-                f"The gyro reads the same up and down, where the vertical Earth rate is {abs(vertical):.4g} °/h: "
+                f"The gyro reads the same up and down, where the vertical Earth rate is {plain(abs(vertical), 4)} °/h: "
                 "was it not turned over, or does another axis stand up?"
             )
             yield Reason("gyro.same", text, ("pass", "fail"), severity="doubt")
@@ -68,10 +65,10 @@ def jumped(found: Findings, up: Array) -> list[Reason]:
     left = found.y - found.X @ np.linalg.lstsq(found.X, found.y, rcond=None)[0]
     means = each.T @ left / each.sum(axis=0)
     text = (
-        f"Equal positions differ by {np.ptp(means) / found.y_scale:.3g} {found.y_unit}, and within none of them the "
-        "readings drift: the bias changed when the axis was turned over (it is touched, heated, switched). Which time "
-        "it was no residual shows: the bias and what goes with gravity may be off by half of that. Take the positions "
-        "again."
+        f"Equal positions differ by {plain(np.ptp(means) / found.y_scale, 3)} {found.y_unit}, and within none of them "
+        "the readings drift: the bias changed when the axis was turned over (it is touched, heated, switched). Which "
+        "time it was no residual shows: the bias and what goes with gravity may be off by half of that. Take the "
+        "positions again."
     )
     return [Reason("turned.jump", text, ("pass", "fail"), severity="doubt")]
 
@@ -96,7 +93,7 @@ def implausible(found: Sequence[Coefficient]) -> Iterator[Reason]:
             text = factor_sentence(factor, FORCES)
             if abs(factor) < NOTHING:
                 text = (
-                    f"The accelerometer reads {factor:.2g} times gravity, up less down: was it not turned over, or "
+                    f"The accelerometer reads {plain(factor)} times gravity, up less down: was it not turned over, or "
                     "does another axis stand up?"
                 ).replace("-", "−")
             yield Reason("force.factor", text, ("pass", "fail"), severity="doubt")

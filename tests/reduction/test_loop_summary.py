@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from gyrobench.reduction.estimation.sentences import Sentence, renewed, seconds, told, with_u
+from gyrobench.reduction.estimation.sentences import Sentence, plain, renewed, seconds, told, with_u
 from gyrobench.reduction.loops.loop_summary import base_torques
 from gyrobench.result import Coefficient, LoopResult
 
@@ -42,6 +42,12 @@ def test_an_interval_that_lies_to_one_side_is_written_by_its_ends() -> None:
     assert with_u(wide) == "2.0 (1.0 to 13.4) °/h"
     (said,) = told([spread], "Spread {f_c}.")
     assert said == "Spread 0.38 (0.27 to 0.63) °/h (95 %)."
+
+
+def test_a_number_of_a_sentence_is_written_as_in_tables() -> None:
+    assert [plain(x) for x in (0.0123, 99.6, 174.0, 83400.0, 2.04e7)] == ["0.012", "100", "170", "83000", "2·10⁷"]
+    assert [plain(x, 3) for x in (-1649.0, 999999.0, 1.724e7)] == ["-1650", "1·10⁶", "1.72·10⁷"]
+    assert [plain(x, 2, "+") for x in (174.0, 3.0, -0.5)] == ["+170", "+3", "-0.5"]
 
 
 def test_a_long_time_has_no_power_of_ten() -> None:

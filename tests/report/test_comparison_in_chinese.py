@@ -100,7 +100,7 @@ def test_several_differences_in_one_sentence() -> None:
 def left(path: Path, allowed: set[str]) -> set[str]:
     """Return the English words of a page, but names of the catalogue and those of rows of settings."""
     text = pdf_text(path)
-    rows = [line for line in text.splitlines() if not re.match(r"\s*(参数|选项|部件|计划阶段|版本|顺序)", line)]
+    rows = [line for line in text.splitlines() if not re.match(r"\s*(参数|选项|部件|计划阶段|版本|执行顺序)", line)]
     return set(WORD.findall("\n".join(rows))) - catalogue("zh").names - allowed
 
 

@@ -29,7 +29,7 @@ from servo_two_axis import (
     record,
     refusals,
     system,
-)  # fmt: skip
+)
 
 from gyrobench import frames
 from gyrobench.reduction.setup.window_checks import ReductionError

@@ -26,7 +26,7 @@ from servoing_two_axes import (
     reduced,
     refusals,
     stiffness_effect,
-)  # fmt: skip
+)
 from stated import FAINT
 from undiagnosed import reduce_undiagnosed
 

@@ -45,6 +45,7 @@ from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation.findings import RAW, WHITENED
 from gyrobench.reduction.estimation.fit_result import UNSTATED
 from gyrobench.reduction.estimation.nuisances import BOTH, NUISANCES, InTheModel
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.result import Autocorrelation, DriftTestResult, Reason, Table
 
 Reduce = Callable[[Record], DriftTestResult]
@@ -89,13 +90,13 @@ def with_diagnosis(
     record: Record, result: DriftTestResult, reduce: Reduce, candidates: Callable[[Record], Iterable[HandlingCandidate]]
 ) -> DriftTestResult:
     """Return the result with the mistake that explains its residuals named, where they are not ordinary."""
-    reference, plain = result, record
+    reference, simple = result, record
     if _hides(result, record):
-        plain = with_options(record, PLAIN)
-        reference = undone(reduce, plain) or result
+        simple = with_options(record, PLAIN)
+        reference = undone(reduce, simple) or result
     if not _suspicious(reference):
         return result
-    return _diagnosed(result, reference, reduce, list(candidates(plain)))
+    return _diagnosed(result, reference, reduce, list(candidates(simple)))
 
 
 def _hides(result: DriftTestResult, record: Record) -> bool:
@@ -197,12 +198,14 @@ def _diagnosed(
     result = replace(result, tables=[table, *result.tables])
     if not named:
         text = (
-            f"The residuals hold more than noise: with {better[0].words} their scatter is {better[0].scatter:.3g} "
-            f"{unit}, as labelled {reference.residual_std:.3g} {unit}; no mistake that was tried explains them."
+            f"The residuals hold more than noise: with {better[0].words} their scatter is "
+            f"{plain(better[0].scatter, 3)} {unit}, as labelled {plain(reference.residual_std, 3)} {unit}; no mistake "
+            "that was tried explains them."
         ) if better else ""  # fmt: skip
         reasons = [Reason("handling.unexplained", text, BOTH, severity="doubt")] if better else []
         return replace(result, reasons=[*reasons, *result.reasons])
-    scatters = f"residual scatter {reference.residual_std:.3g} {unit} as labelled, {named[0].scatter:.3g} {unit} with "
+    as_labelled, best = (plain(x, 3) for x in (reference.residual_std, named[0].scatter))
+    scatters = f"residual scatter {as_labelled} {unit} as labelled, {best} {unit} with "
     names = [t.words for t in named[:4]] + ([f"{len(named) - 4} more"] if len(named) > 4 else [])
     several = " The record cannot tell which of these." if len(named) > 1 else ""
     hidden = " As reduced, it is taken for an error of the set-up." if explained else ""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.result import DriftTestResult, Reason
 from gyrobench.units import DPH
@@ -31,14 +32,14 @@ def earth_rate_warnings(result: DriftTestResult, site: Location) -> list[Reason]
     found, others = [], []
     for c in (c for c in result.coefficients if c.unit in RATES and math.isfinite(c.estimate)):
         near = [
-            (abs(abs(c.estimate) / (m * rate) - 1.0), f"{words} {name}, {m * rate:.4g} °/h")
+            (abs(abs(c.estimate) / (m * rate) - 1.0), f"{words} {name}, {plain(m * rate, 4)} °/h")
             for m, words in ((1.0, "the"), (2.0, "twice the"))
             for name, rate in rates.items()
             if m * rate > LEAST
         ]
         distance, words = min(near, default=(1.0, ""))
         if distance < NEAR:
-            text = f"{c.name} = {c.estimate:.4g} {c.unit} is close to {words}".replace("-", "−")
+            text = f"{c.name} = {plain(c.estimate, 4)} {c.unit} is close to {words}".replace("-", "−")
             found.append((abs(c.estimate), text))
         else:
             others.append(abs(c.estimate))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 from gyrobench.frames import G0
+from gyrobench.reduction.estimation.sentences import plain
 
 NEAR = 0.1  # of a factor that a mistake has
 #: reading over rate -> what makes it
@@ -43,6 +44,7 @@ def factor_sentence(ratio: float, factors: Mapping[float, str] = FACTORS) -> str
     """
     nearest = min(factors, key=lambda f: abs(ratio / f - 1.0))  # 57.3 and 60 are not far apart
     hint = f": {factors[nearest]}?" if abs(ratio / nearest - 1.0) < NEAR else "."
+    times = plain(ratio, 4)
     if factors is FORCES:
-        return f"The accelerometer reads {ratio:.4g} times gravity{hint} Check the senses and units of the readings."
-    return f"The gyro reads {ratio:.4g} times the rate{hint} Check the senses and units of rates and readings."
+        return f"The accelerometer reads {times} times gravity{hint} Check the senses and units of the readings."
+    return f"The gyro reads {times} times the rate{hint} Check the senses and units of rates and readings."

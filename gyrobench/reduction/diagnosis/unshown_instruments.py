@@ -17,6 +17,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.diagnosis.handling_candidates import TIMES, changed
 from gyrobench.reduction.diagnosis.handling_errors import HandlingCandidate, with_options
 from gyrobench.reduction.drift.late_temperature import following
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup.conditions import SHAKEN
 from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.units import DEG
@@ -138,6 +139,6 @@ def warmed(record: Record) -> Iterator[HandlingCandidate]:
         other["the temperature wrong by 1 K"] = T + 1.0
         other["the sign of the changes of the temperature reversed"] = 2.0 * reference - T
         tau = float(np.median(np.diff(w["t_start"])))
-    other[f"an instrument {tau:.3g} s behind the temperature"] = following(w, tau)
+    other[f"an instrument {plain(tau, 3)} s behind the temperature"] = following(w, tau)
     for words, read in other.items():
         yield HandlingCandidate(words, changed(record, temperature=read))

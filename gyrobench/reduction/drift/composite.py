@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Table
 
@@ -54,8 +55,8 @@ def problems(d: Array, t_start: Array, t_end: Array, earth: float = 0.0) -> list
         )
     if abs(earth) > 1e-7 and abs(float(np.mean(d)) + earth) < 0.2 * abs(earth):
         sentences.append(
-            f"the mean {np.degrees(float(np.mean(d))) * 3600.0:.4g} °/h is the table rate against the Earth: add the "
-            f"Earth rate along the input axis, {np.degrees(earth) * 3600.0:.4g} °/h"
+            f"the mean {plain(np.degrees(float(np.mean(d))) * 3600.0, 4)} °/h is the table rate against the Earth: add "
+            f"the Earth rate along the input axis, {plain(np.degrees(earth) * 3600.0, 4)} °/h"
         )
     return sentences
 

@@ -18,6 +18,7 @@ from gyrobench.reduction.drift.pulses import CurrentWindows, Pulses
 from gyrobench.reduction.drift.supplies import Supplies
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup import sources
 from gyrobench.reduction.setup.run_metadata import number, truth_of
 from gyrobench.reduction.setup.setups import RebalanceSetup, scale_factor_problems
@@ -148,7 +149,7 @@ def torquer_effects(
     """
     current = read.mean
     full = float(np.max(np.abs(current))) or 1.0
-    scale, nonlinearity, zero, resolution = torquer_sources(axis, f"{full * 1e3:.3g} mA")
+    scale, nonlinearity, zero, resolution = torquer_sources(axis, f"{plain(full * 1e3, 3)} mA")
     offset = found.error(-k * np.ones_like(current))
     return [
         scale.effect(s, found.error(-k * current)),

@@ -16,6 +16,7 @@ import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation.regression import Fit, RegressionError, least_squares
+from gyrobench.reduction.estimation.sentences import plain
 
 
 def columns(start: Array, end: Array, orders: Sequence[int]) -> tuple[Array, tuple[str, ...]]:
@@ -41,7 +42,7 @@ def fit(start: Array, end: Array, y: Array, order: int = 2) -> Fit:
     width = float(np.max(np.abs(end - start)))
     if order and abs(np.sinc(order * width / (2.0 * math.pi))) < 0.1:
         raise RegressionError(
-            f"windows of {math.degrees(width):.4g} deg average harmonic {order} away; use windows of at "
+            f"windows of {plain(math.degrees(width), 4)} deg average harmonic {order} away; use windows of at "
             f"most {math.degrees(1.8 * math.pi / order):.0f} deg"
         )
     X, names = columns(start, end, range(order + 1))

@@ -30,6 +30,7 @@ from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.effects import one_by_one
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.nuisances import Candidate
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup import sources, window_checks
 from gyrobench.reduction.setup.run_metadata import Location
 from gyrobench.reduction.setup.window_checks import ReductionError
@@ -151,9 +152,9 @@ def tracking_problems(windows: Mapping[str, Array], rows: NDArray[np.bool_], gai
         return []
     arcsec = np.degrees(float(np.max(size[exceeding]))) * 3600.0
     return [
-        f"the table is up to {arcsec:.3g} arcsec away from the gyro in {exceeding.size} windows (first: row "
+        f"the table is up to {plain(arcsec, 3)} arcsec away from the gyro in {exceeding.size} windows (first: row "
         f"{exceeding[0] + 1}); "
-        f"{np.degrees(limit) * 3600.0:.3g} arcsec are allowed: friction or torque ripple too large for the loop"
+        f"{plain(np.degrees(limit) * 3600.0, 3)} arcsec are allowed: friction or torque ripple too large for the loop"
     ]
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.result import Coefficient, Table
 from gyrobench.units import DEG
 
@@ -101,10 +102,11 @@ class SmallRates:
         low, high = (x / self.scale for x in self.bounds)
         if low == 0.0:
             return _without(
-                nothing, f"below {high:.4g} {self.unit}: none of the plan is surely without an answer", high
+                nothing, f"below {plain(high, 4)} {self.unit}: none of the plan is surely without an answer", high
             )
         if math.isinf(high):
-            return _without(nothing, f"above {low:.4g} {self.unit}: none of the plan is surely answered", math.nan)
+            why = f"above {plain(low, 4)} {self.unit}: none of the plan is surely answered"
+            return _without(nothing, why, math.nan)
         u = (high - low) / math.sqrt(12.0)  # nothing is known between the two
         return Coefficient(
             "threshold", MEANING, self.unit, 0.5 * (low + high), u, math.sqrt(3.0), (low, high), truth=shown,
@@ -132,7 +134,7 @@ class SmallRates:
             return []
         if found.no_value:
             return [f"Threshold {found.no_value}."]
-        return [f"Threshold between {found.interval[0]:.4g} and {found.interval[1]:.4g} {self.unit}."]
+        return [f"Threshold between {plain(found.interval[0], 4)} and {plain(found.interval[1], 4)} {self.unit}."]
 
 
 def _without(c: Coefficient, why: str, high: float) -> Coefficient:

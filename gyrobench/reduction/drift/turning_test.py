@@ -35,6 +35,7 @@ from gyrobench.reduction.estimation.nuisances import Candidate
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.regression import Fit
 from gyrobench.reduction.estimation.reported import Group
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup import setups, sources
 from gyrobench.reduction.setup.sources import Effect, Source
 from gyrobench.reduction.setup.stops import whole_stops
@@ -199,7 +200,8 @@ class TurningTest(DriftReduction[T]):
                     continue
                 if harmonic.whole_turns(start, end) is None:
                     turned = math.degrees(float(np.sum(np.abs(end - start))))
-                    return {}, {}, f"phase {p} covers {turned:.4g}°, no whole turns without gap; least squares only"
+                    covers = f"phase {p} covers {plain(turned, 4)}°"
+                    return {}, {}, f"{covers}, no whole turns without gap; least squares only"
             fits[name] = harmonic.fit(-t.angle_start[rows], -t.angle_end[rows], y[rows])
         return fits, means, ""
 

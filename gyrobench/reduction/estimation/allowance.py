@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.result import Coefficient, SetBy, Table, VarianceShare
 
 TINY = 1e-9  # of the square: less is rounding
@@ -73,7 +74,7 @@ def at_most(s: SetBy, k: float | None, without: str, cancels: bool = False) -> f
 def _rows(share: VarianceShare, wanted: float, unit: str) -> list[list[object]]:
     """Return a row for each quantity that sets a source."""
     k = largest_factor(share.square, wanted)
-    without = f"{math.sqrt(max(share.square[0], 0.0)):.3g} {unit}"
+    without = f"{plain(math.sqrt(max(share.square[0], 0.0)), 3)} {unit}"
     most = [at_most(s, k, without, bool(crossings(share.square, wanted))) for s in share.set_by]
     factor = None if all(isinstance(x, str) for x in most) else k
     return [[share.source, factor, s.name, s.now, x, s.unit] for s, x in zip(share.set_by, most, strict=True)]

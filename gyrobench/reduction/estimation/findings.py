@@ -25,7 +25,7 @@ from gyrobench.reduction.estimation.noise_estimate import Evidence, NoiseEstimat
 from gyrobench.reduction.estimation.nuisances import Candidate, Hidden
 from gyrobench.reduction.estimation.quantity import Quantity
 from gyrobench.reduction.estimation.reported import Estimates
-from gyrobench.reduction.estimation.sentences import p_text
+from gyrobench.reduction.estimation.sentences import p_text, plain
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.result import AllanDeviation, Autocorrelation, PowerSpectrum, Reason, Series, Table, Test
 
@@ -278,7 +278,7 @@ class Findings:
 
     def noise_sentence(self, what: str = "windows") -> str:
         """Return the residual standard deviation and its noise model as a sentence, for the summary."""
-        text = f"Residual standard deviation of the {what}: {self.residual_std:.3g} {self.y_unit}"
+        text = f"Residual standard deviation of the {what}: {plain(self.residual_std, 3)} {self.y_unit}"
         if self.ideal or self.white:
             return text + (", rounding only." if self.ideal else ", treated as white noise.")
         return f"{text}{self.est.noise.words(bool(self.broken()))}."

@@ -25,7 +25,7 @@ from gyrobench.reduction.estimation.effects import (
     standard_changes,
 )
 from gyrobench.reduction.estimation.findings import Findings
-from gyrobench.reduction.estimation.sentences import p_text
+from gyrobench.reduction.estimation.sentences import p_text, plain
 from gyrobench.reduction.estimation.truth_check import compared
 from gyrobench.reduction.estimation.verdict import DECISION_RULE, SLOW_RULE
 from gyrobench.reduction.setup.setups import Setup
@@ -227,7 +227,7 @@ def _slow_drift(fit: Findings, coefficients: Sequence[Coefficient], contribution
         return []
     text = (
         "The noise may be slow drift, which this record does not tell from white noise (probability "
-        f"{probability:.2g}); U would then be larger. Record longer to decide."
+        f"{plain(probability)}); U would then be larger. Record longer to decide."
     )
     return [Reason("noise.slow", text, ("pass", "fail"), severity="condition", intervals=intervals)]
 
@@ -237,7 +237,7 @@ def _ill_conditioned(fit: Findings) -> list[Reason]:
     if design.condition <= CONDITION:
         return []
     text = (
-        f"The condition number is {design.condition:.3g} (limit {CONDITION:g}). The least-determined combination "
+        f"The condition number is {plain(design.condition, 3)} (limit {CONDITION:g}). The least-determined combination "
         f"is {design.weakest}; errors of the model are amplified in it."
     )
     return [Reason("design.ill_conditioned", text)]

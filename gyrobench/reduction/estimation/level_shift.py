@@ -23,6 +23,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.result import Reason
 
 LEVEL = 0.002  # probability that a clean record is said to jump; its likeliest noise is an estimate
@@ -48,9 +49,9 @@ def jumped(found: Findings) -> list[Reason]:
             return []
     by = told.size / found.y_scale
     text = (
-        f"From row {told.at + LEAST + 1} on the level of the record is another one, by {by:+.3g} {found.y_unit} "
-        f"({told.t:.0f} standard deviations). The estimates take it for slow noise, or for what was done then. Look "
-        "for the cause, and measure again or leave the rows before or after it out."
+        f"From row {told.at + LEAST + 1} on the level of the record is another one, by {plain(by, 3, '+')} "
+        f"{found.y_unit} ({told.t:.0f} standard deviations). The estimates take it for slow noise, or for what was "
+        "done then. Look for the cause, and measure again or leave the rows before or after it out."
     )
     return [Reason("level.shift", text.replace("-", "−"), ("pass", "fail"), severity="doubt")]
 

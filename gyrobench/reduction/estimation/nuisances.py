@@ -24,6 +24,7 @@ from gyrobench.frames import G0
 from gyrobench.reduction.estimation import nuisance_states
 from gyrobench.reduction.estimation.noise_estimate import Evidence, NoiseEstimate
 from gyrobench.reduction.estimation.nuisance_states import NuisanceBlock
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.result import Reason, Table
 from gyrobench.units import DPH
 
@@ -243,7 +244,8 @@ def _beyond_bound(c: Candidate, model: Array, y: Array) -> str:
     u = sigma * math.sqrt(float(np.linalg.inv(X.T @ X)[-1, -1]))
     if u <= c.bound or abs(found[-1]) > FLAGRANT * u:
         return ""
-    return f"not weighed: this record determines it to {u / c.scale:.2g} {c.unit} only, more than {c.bound / c.scale:g}"
+    size = plain(u / c.scale)
+    return f"not weighed: this record determines it to {size} {c.unit} only, more than {c.bound / c.scale:g}"
 
 
 def _own_contrasts(c: Candidate, other: Candidate, model: Array) -> int:
@@ -298,8 +300,8 @@ def sentences(
         of_columns = float(e.value[0]), float(e.u[0])
         value, u = (e.scatter[0], e.scatter[1]) if c.scatter else stated.get(c.name, of_columns)
         text = (
-            f"In the model: {c.meaning}, {c.name} = {value / c.scale:.3g} {c.unit} (u = {u / c.scale:.2g} {c.unit}, "
-            f"probability {_percent(e.probability)})."
+            f"In the model: {c.meaning}, {c.name} = {plain(value / c.scale, 3)} {c.unit} (u = {plain(u / c.scale)} "
+            f"{c.unit}, probability {_percent(e.probability)})."
         )
         out.append(InTheModel(text))
     return out
@@ -312,15 +314,15 @@ def implausible(candidates: Sequence[Candidate], est: NoiseEstimate) -> list[Rea
         if not c.scatter and abs(float(e.value[0])) > c.largest:
             size, most = float(e.value[0]) / c.scale, c.largest / c.scale
             text = (
-                f"The fit takes the residuals for {c.name} = {size:.3g} {c.unit} ({c.meaning}), more than {most:g} "
-                f"{c.unit}: no error of the set-up, but an attitude, a sign, a column or a unit is mistaken."
+                f"The fit takes the residuals for {c.name} = {plain(size, 3)} {c.unit} ({c.meaning}), more than "
+                f"{most:g} {c.unit}: no error of the set-up, but an attitude, a sign, a column or a unit is mistaken."
             )
             out.append(Reason("nuisance.implausible", text, BOTH, severity="doubt"))
     return out
 
 
 def _percent(p: float) -> str:
-    return "above 99.9 %" if p > 0.999 else f"{100.0 * p:.3g} %"
+    return "above 99.9 %" if p > 0.999 else f"{plain(100.0 * p, 3)} %"
 
 
 def reported(candidates: Sequence[Candidate], est: NoiseEstimate) -> list[tuple[Candidate, Evidence]]:

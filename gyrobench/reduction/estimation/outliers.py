@@ -25,6 +25,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import asked
 from gyrobench.reduction.estimation import noise as noise_model
 from gyrobench.reduction.estimation.findings import Findings
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Reason, Table
@@ -140,7 +141,7 @@ def warnings(found: Findings, outliers: Outliers | None) -> list[Reason]:
     if outliers is None:
         return []
     rows, rest = outliers.rows, outliers.without
-    each = [f"{d:+.3g} {found.y_unit}".replace("-", "−") for d in outliers.distance]
+    each = [f"{plain(d, 3, '+')} {found.y_unit}".replace("-", "−") for d in outliers.distance]
     far = [f", {abs(t):.0f} standard deviations" if abs(t) < ENDLESS else "" for t in outliers.t]
     shown = zip(rows[:LISTED], each, far, strict=False)
     listed = "; ".join(f"{row + 1} ({off}{deviations})" for row, off, deviations in shown)
@@ -149,13 +150,16 @@ def warnings(found: Findings, outliers: Outliers | None) -> list[Reason]:
     moves = {(a, b): abs(rest.value[b] - found.value[a]) / rest.u[b] for a, b in both if rest.u[b] > 0.0}
     a, b = max(moves, key=moves.__getitem__, default=both[0])  # u of a quantity that is none is 0
     q = found.quantities[a]
-    values = f"{rest.value[b] / q.scale:.6g}{q.unit and ' '}{q.unit} (u = {rest.u[b] / q.scale:.2g})".replace("-", "−")
-    plain = f"{found.value[a] / q.scale:.6g} (u = {found.u[a] / q.scale:.2g})".replace("-", "−")
+    (value, u), (value_of_all, u_of_all) = (
+        (plain(x / q.scale, 6).replace("-", "−"), plain(u / q.scale))
+        for x, u in ((rest.value[b], rest.u[b]), (found.value[a], found.u[a]))
+    )
+    values = f"{value}{q.unit and ' '}{q.unit} (u = {u}) in place of {value_of_all} (u = {u_of_all})"
     what, them = ("Row", "it") if rows.size == 1 else ("Rows", "them")
     verb = "lies" if rows.size == 1 else "lie"
     text = (
         f"{what} {listed}{more} {verb} outside the noise of the others. They are in the estimates; without {them} "
-        f"{q.title} = {values} in place of {plain}. Look for the cause, and leave {them} out only if it is one."
+        f"{q.title} = {values}. Look for the cause, and leave {them} out only if it is one."
     )
     moved = abs(rest.value[b] - found.value[a]) > NORMAL * rest.u[b]
     return [Reason("outliers", text, ("pass", "fail") if moved else ())]

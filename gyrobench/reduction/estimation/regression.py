@@ -18,6 +18,7 @@ from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.errors import GyrobenchError
+from gyrobench.reduction.estimation.sentences import plain
 
 
 class RegressionError(GyrobenchError, ValueError):
@@ -44,7 +45,7 @@ class Design:
         """What is not estimable, or else least determined, in words."""
         if self.short:
             return f"rank {self.rank} of {len(self.names)}, not estimable: {'; '.join(self.lost)}"
-        return f"condition {self.condition:.3g}, least determined: {self.weakest}"
+        return f"condition {plain(self.condition, 3)}, least determined: {self.weakest}"
 
 
 def _words(names: Sequence[str], vector: Array, floor: float = 0.05) -> str:
@@ -53,7 +54,7 @@ def _words(names: Sequence[str], vector: Array, floor: float = 0.05) -> str:
     for k in np.argsort(-np.abs(vector), kind="stable"):
         if abs(vector[k]) >= floor:
             sign = "−" if vector[k] < 0 else "+"
-            size = "" if abs(abs(vector[k]) - 1.0) < 5e-7 else f"{abs(vector[k]):.4g} "
+            size = "" if abs(abs(vector[k]) - 1.0) < 5e-7 else f"{plain(abs(vector[k]), 4)} "
             parts.append(f"{sign} {size}{names[k]}")
     return " ".join(parts).removeprefix("+ ")
 
@@ -158,7 +159,7 @@ def check_data(X: Array, y: Array, names: Sequence[str], limit: float = 1e3) -> 
         raise RegressionError(f"rank {design.rank} for {p} coefficients; not estimable: {'; '.join(design.lost)}")
     if design.condition > limit:
         raise RegressionError(
-            f"condition number {design.condition:.4g} above {limit:g}; least determined: {design.weakest}"
+            f"condition number {plain(design.condition, 4)} above {limit:g}; least determined: {design.weakest}"
         )
     return design
 

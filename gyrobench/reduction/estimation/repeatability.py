@@ -24,6 +24,7 @@ from gyrobench.record.record import Record
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import TYPE_A
 from gyrobench.reduction.estimation.nuisances import NUISANCES
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.estimation.truth_check import compared
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import BudgetLine, Coefficient, DriftTestResult, Reason, Series, Table, Test
@@ -167,7 +168,7 @@ def _without_own_effects(results: Mapping[str, DriftTestResult]) -> dict[str, Dr
 def _few(coefficients: list[Coefficient], table: Array, what: str) -> list[str]:
     sigma = [statistics(column).sigma for column in table.T.tolist()]
     both = list(zip(coefficients, sigma, strict=True))[:2]
-    return [f"{c.name} = {c.estimate:.6g} {c.unit}, σ over the {what}s {s:.2g} {c.unit}." for c, s in both]
+    return [f"{c.name} = {plain(c.estimate, 6)} {c.unit}, σ over the {what}s {plain(s)} {c.unit}." for c, s in both]
 
 
 def _mean(per_day: list[Coefficient]) -> Coefficient:

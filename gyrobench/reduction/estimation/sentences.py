@@ -19,35 +19,27 @@ ROUNDING = 1e-9  # of an estimate: a smaller U is that of data without noise
 SAID = {"arcsec": "″", "1e-6": "ppm"}  # units as a sentence has them
 SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 ONE_SIDED = 0.1  # of its width: how far the middle of an interval is off its estimate, and it is written by its ends
-POWER = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e\+(\d+)(?!\w|\.\w)")  # of Python's, in "1.7e+02 °/h"
 PLAIN = 6  # digits before the decimal sign that are written without a power of ten, as in tables
 FIELD = re.compile(r"\{(-?)([^{}]+)\}")
 
 
 def p_text(p: float) -> str:
     """Return a probability as the tables write it: "p < 0.001" or "p = 0.23"."""
-    return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+    return "p < 0.001" if p < 0.001 else f"p = {plain(p)}"
 
 
-def plain(x: float, digits: int = 2) -> str:
-    """Return "1.7", "190": a number with so many digits, a large one without a power of ten."""
-    text = f"{x:.{digits}g}"
-    return f"{float(text):.0f}" if "e+" in text else text
+def plain(x: float, digits: int = 2, sign: str = "") -> str:
+    """Return "1.7", "190", "1.7·10⁷": a number with so many digits, a large one as tables write it; sign: "+"."""
+    text = f"{x:{sign}.{digits}g}"
+    number, large, power = text.partition("e+")
+    if not large:
+        return text
+    return f"{float(text):{sign}.0f}" if int(power) < PLAIN else f"{number}·10{str(int(power)).translate(SUPERSCRIPT)}"
 
 
 def seconds(t: float, digits: int = 3) -> str:
     """Return "15.4 s", "13510 s"."""
     return f"{plain(t, digits)} s"
-
-
-def written_out(text: str) -> str:
-    """Return a sentence with its large numbers as tables write them: 1.7e+02 as 170, 1.7e+07 as 1.7·10⁷."""
-
-    def number(m: re.Match[str]) -> str:
-        power = int(m[2])
-        return f"{float(m[0]):.0f}" if power < PLAIN else f"{m[1]}·10{str(power).translate(SUPERSCRIPT)}"
-
-    return POWER.sub(number, text) if "e+" in text else text
 
 
 def _is_uncertain(c: Coefficient) -> bool:
@@ -114,6 +106,4 @@ def told(coefficients: Sequence[Coefficient], *templates: str) -> list[str]:
 
 def renewed(result: Result) -> list[str]:
     """Return the summary of a result with its present estimates and uncertainties in the sentences."""
-    return [
-        Sentence(s.template, result.coefficients) if isinstance(s, Sentence) else written_out(s) for s in result.summary
-    ]
+    return [Sentence(s.template, result.coefficients) if isinstance(s, Sentence) else s for s in result.summary]

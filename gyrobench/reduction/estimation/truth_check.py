@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.estimation.effects import PREDICTED
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.result import Coefficient, Reason, Result
 
 LIMIT = 5.0  # of |z|: by chance once in two million
@@ -61,5 +62,5 @@ def set_values(run: RunDocument) -> list[str]:
             causes.append(f"part {run.parts[slot].name} in slot {slot}" if slot in run.parts else name)
         elif name.partition("[")[0] not in errors and name != "type_b" and not name.startswith("u_"):
             value = run.parameters.get(name, run.options.get(name))
-            causes.append(f"{name} = {value:.6g} (SI)" if isinstance(value, float) else name)
+            causes.append(f"{name} = {plain(value, 6)} (SI)" if isinstance(value, float) else name)
     return causes

@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 
 from gyrobench.record.record import Record
 from gyrobench.reduction.estimation.allowance import allowances
-from gyrobench.reduction.estimation.sentences import renewed, written_out
+from gyrobench.reduction.estimation.sentences import plain, renewed
 from gyrobench.reduction.estimation.step_effect import with_step
 from gyrobench.reduction.estimation.truth_check import missed_truth, set_values
 from gyrobench.reduction.setup import conditions
@@ -92,9 +92,7 @@ def conclude(
     found = replace(found, coefficients=judged, reasons=reasons, verdict=verdict, decision_rule=rule)
     if isinstance(found, LoopResult):
         found = replace(found, tables=[*found.tables, *allowances(found.shares, judged)])
-    reasons = [replace(r, text=written_out(r.text)) for r in found.reasons]
-    conventions = [written_out(text) for text in found.conventions]
-    return replace(found, summary=renewed(found), reasons=reasons, conventions=conventions)
+    return replace(found, summary=renewed(found))
 
 
 def _judged(
@@ -126,7 +124,7 @@ def _named(c: Coefficient, reason: Reason) -> str:
     if c.name not in reason.intervals:
         return c.name
     low, high = reason.intervals[c.name]
-    return f"{c.name} (U = {0.5 * (high - low):.2g} {c.unit})"
+    return f"{c.name} (U = {plain(0.5 * (high - low))} {c.unit})"
 
 
 def _takes(reason: Reason, c: Coefficient) -> bool:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops import estimator_metrics
 from gyrobench.reduction.loops.estimator_metrics import Consistency, UncertainValue
 from gyrobench.reduction.loops.measure_findings import MeasureFindings
@@ -101,8 +102,8 @@ def measure(
     phase = 360.0 * CROSSOVER * latency
     if phase > LOOP:
         text = (
-            f"The stated delay of {latency * 1e3:.4g} ms costs {phase:.3g}° of phase margin at a crossover of "
-            f"{CROSSOVER:g} Hz, more than the {LOOP:g}° an estimator inside a loop may take."
+            f"The stated delay of {plain(latency * 1e3, 4)} ms costs {plain(phase, 3)}° of phase margin at a crossover "
+            f"of {CROSSOVER:g} Hz, more than the {LOOP:g}° an estimator inside a loop may take."
         )
         found.warn("estimator.delay", text)
 
@@ -149,7 +150,7 @@ def _distortion(found: MeasureFindings, s: Signals, behind: Array, known: slice,
         worse = found["error re raw"].estimate > 0.0
         so = "Part of the noise reduction is attenuation of the signal"
         so = "Its error is larger than that of the readings" if worse else so
-        found.warn("estimator.gain", f"The gain of the estimator on the signal is {r.gain.value:.3g}. {so}.")
+        found.warn("estimator.gain", f"The gain of the estimator on the signal is {plain(r.gain.value, 3)}. {so}.")
 
 
 def _consistency(found: MeasureFindings, s: Signals, R: float | None) -> None:
@@ -173,9 +174,10 @@ def _consistency(found: MeasureFindings, s: Signals, R: float | None) -> None:
 def _against_chi_square(found: MeasureFindings, name: str, what: str, c: Consistency) -> None:
     # 1 is not the truth of it: that is what a filter is asked, and the answer may well be no
     found.add(name, f"mean squared {what} divided by its stated variance, 1 where that is right", "1", c.value)
-    seeks = f"stated variance of the {what}; 99.9 % bounds {c.low:.3g} to {c.high:.3g} ({c.dof:.0f} squares)"
+    low, high = plain(c.low, 3), plain(c.high, 3)
+    seeks = f"stated variance of the {what}; 99.9 % bounds {low} to {high} ({c.dof:.0f} squares)"
     wrong = consistency_test(found, name, c.mean, 1.0, c.p, c.holds, seeks, f"{what} variance", "variance")
-    text = f"{name} = {c.mean:.3g}, outside {c.low:.3g} to {c.high:.3g}; {wrong}."
+    text = f"{name} = {plain(c.mean, 3)}, outside {low} to {high}; {wrong}."
     found.warn(f"estimator.consistency:{name}", text if wrong else "")
 
 

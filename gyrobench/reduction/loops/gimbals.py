@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Table
@@ -83,12 +84,12 @@ def rate_servo_limits(flight: Flight, rates: Sequence[str], rate_max: float | No
     limit = rate_max * (1.0 - 1e-9)
     text = (
         "The servos take the motion of the base out exactly; it reaches the platform only in gimbal lock or with a "
-        f"gimbal at its largest rate, {rate_max / DEG:.3g}°/s: "
+        f"gimbal at its largest rate, {plain(rate_max / DEG, 3)}°/s: "
     )
     if sizes.max() < limit:
-        return [f"{text}in the flight the gimbals turned by up to {sizes.max() / DEG:.3g}°/s."]
+        return [f"{text}in the flight the gimbals turned by up to {plain(sizes.max() / DEG, 3)}°/s."]
     first = int(np.argmax(sizes >= limit))
-    return [f"{text}reached in the flight at t = {flight.t[first]:.4g} s (leg “{flight.leg_at(first)}”)."]
+    return [f"{text}reached in the flight at t = {plain(flight.t[first], 4)} s (leg “{flight.leg_at(first)}”)."]
 
 
 def spans(flag: Array | NDArray[np.bool_]) -> list[tuple[int, int]]:

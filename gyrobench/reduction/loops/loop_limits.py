@@ -13,6 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from gyrobench.record.frequency_response import model_response
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_result import LoopFindings
 
@@ -43,11 +44,12 @@ def bandwidth(found: LoopFindings, lags: Mapping[str, Mapping[str, float]]) -> l
         return []
     least = min(margin, key=lambda loop: margin[loop])
     crossover, taken = phase_taken(found, least, lags[least])
-    listed = [f"{angle:.2g}° ({name})" for name, angle in sorted(taken.items(), key=lambda i: -i[1]) if angle >= 0.05]
+    largest = sorted(taken.items(), key=lambda i: -i[1])
+    listed = [f"{plain(angle)}° ({name})" for name, angle in largest if angle >= 0.05]
     if not listed:
         return []
     words = ", ".join(listed[:-1]) + (" and " if listed[:-1] else "") + listed[-1]
     return [
-        f"Lags limit the bandwidth: at the crossover of the {least} loop, {crossover:.3g} Hz, they take {words} of its "
-        "phase, at a higher one more."
+        f"Lags limit the bandwidth: at the crossover of the {least} loop, {plain(crossover, 3)} Hz, they take {words} "
+        "of its phase, at a higher one more."
     ]

@@ -22,6 +22,7 @@ from scipy import special
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import PlanRow
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Table
@@ -233,7 +234,7 @@ class Step:
         """Return why there is no final value, "" where there is one: it moves by less than 2 % of the change."""
         if self.moves <= UNSETTLED * abs(self.change):
             return ""
-        share = f"{100.0 * self.moves / abs(self.change):.2g} % of the change" if self.change else "without a change"
+        share = f"{plain(100.0 * self.moves / abs(self.change))} % of the change" if self.change else "without a change"
         return f"not settled: in the last tenth of the step the signal still moves by {share}, more than its u"
 
     @property
@@ -335,8 +336,8 @@ def short_rest(quiet: Gate, samples: int, measures: Step) -> str:
     if time >= PIECES * length or measures.u_change <= SEEN * abs(measures.change):
         return ""
     return (
-        f"The phase {quiet.label} of {time:.3g} s is shorter than {PIECES} steps of {length:.3g} s: slower noise is "
-        f"not in the u of the steps. Hold for {PIECES * length:.3g} s or longer."
+        f"The phase {quiet.label} of {plain(time, 3)} s is shorter than {PIECES} steps of {plain(length, 3)} s: slower "
+        f"noise is not in the u of the steps. Hold for {plain(PIECES * length, 3)} s or longer."
     )
 
 

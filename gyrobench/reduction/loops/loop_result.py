@@ -21,6 +21,7 @@ from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModel, LinearModels, LinearPair, RunDocument
 from gyrobench.reduction.estimation import uncertainty
 from gyrobench.reduction.estimation.fit_result import Account
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops import margins as m
 from gyrobench.reduction.loops.loop_curves import CURVE, bode, curve, simulated, step_figure
 from gyrobench.reduction.loops.loop_drift import Drift, drift
@@ -200,7 +201,7 @@ class LoopFindings(MeasureFindings):
             closed = None if dense is None else dense.limit(side)
             if side not in values:
                 if side == "upper" and closed is not None and at:
-                    none = f"no limit up from {min(at):.3g} to {max(at):.3g} Hz, the frequencies that count"
+                    none = f"no limit up from {plain(min(at), 3)} to {plain(max(at), 3)} Hz, the frequencies that count"
                     self.measure(f"{name}{key}", what, "dB", None, closed=closed, no_value=none)
                 continue
             factor, u = values[side]
@@ -245,7 +246,7 @@ class LoopFindings(MeasureFindings):
     def _missed(self, title: str, crossover: float, u: float, wanted: float | None) -> None:
         """Warn of a crossover that is not the one asked for, where no linear model said so before the run."""
         if wanted is not None and abs(crossover - wanted) > TOLERANCE * wanted + uncertainty.NORMAL * u:
-            text = f"The {title} crosses at {crossover:.3g} Hz, not at the {wanted:.4g} Hz asked for."
+            text = f"The {title} crosses at {plain(crossover, 3)} Hz, not at the {plain(wanted, 4)} Hz asked for."
             self.warn("loop.crossover_missed", text)
 
     def _agreement(
@@ -258,9 +259,11 @@ class LoopFindings(MeasureFindings):
 
     def _conditional(self, title: str, limits: m.Margins) -> None:
         if limits.lower is not None:
-            text = f"The {title} is conditionally stable: it becomes unstable when its gain falls to {limits.lower:.3g}"
-            upper = f" or rises to {limits.upper:.3g}" if limits.upper is not None else ""
-            text = f"{text}{upper} times its value. Saturation of the motor reduces the gain."
+            upper = f" or rises to {plain(limits.upper, 3)}" if limits.upper is not None else ""
+            falls = (
+                f"falls to {plain(limits.lower, 3)}{upper} times its value. Saturation of the motor reduces the gain."
+            )
+            text = f"The {title} is conditionally stable: it becomes unstable when its gain {falls}"
             self.warn("loop.conditionally_stable", text)
 
     def ratio(

@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from gyrobench.reduction.estimation.sentences import Sentence, told
+from gyrobench.reduction.estimation.sentences import Sentence, plain, told
 from gyrobench.reduction.loops.loop_result import LoopFindings
 from gyrobench.reduction.loops.open_loop import friction_of
 from gyrobench.result import Response
@@ -48,8 +48,8 @@ def _gain(found: LoopFindings, loop: str, key: str) -> str:
             modelled = modelled or not seen
             f = row[at + 1]
             f = by_model[at + 1] if f and abs((by_model[at + 1] or 0.0) / f - 1.0) < SHIFTED else f
-            where = f" to an oscillation at {f:.3g} Hz" if f else ""
-            texts.append(f"{verb} by {name if seen else f'{abs(row[at]):.3g} dB'}{where}")
+            where = f" to an oscillation at {plain(f, 3)} Hz" if f else ""
+            texts.append(f"{verb} by {name if seen else f'{plain(abs(row[at]), 3)} dB'}{where}")
     source = ", by the linear model" if modelled else ""
     return f"; the gain may {' or '.join(texts)}{source}" if texts else ""
 
@@ -67,9 +67,9 @@ def isolation(found: LoopFindings, name: str, output: str, axis: int = 1, plus: 
     worst = max(range(len(measured.x)), key=lambda i: measured.y[i])
     if max(measured.y) < 1e-9:
         return []
-    text = f"Base motion at {measured.x[k]:.3g} Hz reaches the platform {_attenuated(measured, k)}"
+    text = f"Base motion at {plain(measured.x[k], 3)} Hz reaches the platform {_attenuated(measured, k)}"
     if 20.0 * math.log10(measured.y[worst] / measured.y[k]) > SAME:
-        text += f", at {measured.x[worst]:.3g} Hz, the worst of the sweep, {_attenuated(measured, worst)}"
+        text += f", at {plain(measured.x[worst], 3)} Hz, the worst of the sweep, {_attenuated(measured, worst)}"
     text += " (95 %, noise only)" if "±" in text else ""
     by = limiting(found, output, measured.x[k], axis, plus, measured.y[k])
     dry = friction_of(found.record.run)

@@ -16,6 +16,7 @@ import numpy as np
 from gyrobench.record.frequency_response import model_response
 from gyrobench.record.record import Record
 from gyrobench.record.run_document import LinearModel, RunDocument
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_measures import (
     Gate,
@@ -105,7 +106,7 @@ def excluded_words(title: str, points: Sequence[Point], counts: Sequence[bool]) 
     out = [p for p, c in zip(points, counts, strict=True) if not c]
     if not out:
         return ""
-    named = ", ".join(f"{p.f:.3g} Hz ({p.coherence:.2f})" for p in out)
+    named = ", ".join(f"{plain(p.f, 3)} Hz ({p.coherence:.2f})" for p in out)
     return (
         f"The {title} is too noisy at {named}: the coherence with the test signal (in brackets) must be {COHERENCE:g}, "
         "where u of the gain is 12 %. These points do not count for the margins. Use a larger test signal or longer "
@@ -120,7 +121,7 @@ def friction_of(run: RunDocument) -> str:
         if name.rpartition(".")[2] in ("friction", "stiction"):
             size = float(np.max(np.abs(np.asarray(value, float)), initial=0.0))
             if size > 0.0:
-                known.append(f"{name} = {size:.3g} N·m")
+                known.append(f"{name} = {plain(size, 3)} N·m")
     return ", ".join(known)
 
 
@@ -137,17 +138,17 @@ def why_no_crossover(points: Sequence[Point], measured: int, run: RunDocument) -
             f"{len(points)} of {measured} measured frequencies have a coherence of {COHERENCE:g} or more; 4 are needed"
         )
     low, high = min(points, key=lambda p: p.f), max(points, key=lambda p: p.f)
-    span = f"{low.f:.3g} to {high.f:.3g} Hz"
+    span = f"{plain(low.f, 3)} to {plain(high.f, 3)} Hz"
     largest = max(points, key=lambda p: abs(p.value))
     if all(abs(p.value) > 1.0 for p in points):
         return f"the gain does not fall through 1 from {span}, the frequencies that count"
     if abs(largest.value) > 1.0:
         near = unity_range(points) or (low.f, high.f)
         return (
-            f"the gain cannot be told from 1 between {near[0]:.3g} and {near[1]:.3g} Hz, and points there or beside "
-            "are too noisy to count"
+            f"the gain cannot be told from 1 between {plain(near[0], 3)} and {plain(near[1], 3)} Hz, and points there "
+            "or beside are too noisy to count"
         )
-    reason = f"the gain is below 1 from {span}, the frequencies that count (largest {abs(largest.value):.2g})"
+    reason = f"the gain is below 1 from {span}, the frequencies that count (largest {plain(abs(largest.value))})"
     friction = friction_of(run)
     if not friction:
         return reason
@@ -200,7 +201,7 @@ def disagreement(title: str, crossover: Value, phase: Value, twin: Twin, causes:
     """Return the warning that measured and computed margins differ, with what may explain it."""
     why = "; ".join(causes) or "unknown (no limit was active, no dry friction, no noisy point)"
     return (
-        f"The {title} was measured to cross at {crossover[0]:.4g} Hz with a phase margin of {phase[0]:.3g}°; its "
-        f"linear model, with step and delays, crosses at {twin.at:.4g} Hz with {twin.margin:.3g}°. The difference "
-        f"exceeds its expanded uncertainty. Possible causes: {why}."
+        f"The {title} was measured to cross at {plain(crossover[0], 4)} Hz with a phase margin of "
+        f"{plain(phase[0], 3)}°; its linear model, with step and delays, crosses at {plain(twin.at, 4)} Hz with "
+        f"{plain(twin.margin, 3)}°. The difference exceeds its expanded uncertainty. Possible causes: {why}."
     )

@@ -18,6 +18,7 @@ from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
 from gyrobench.reduction.diagnosis.unshown import ARRANGEMENT
 from gyrobench.reduction.estimation.effects import shifts_table
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.loops.loop_measures import Gate, neighbour_noise, phasor
 from gyrobench.reduction.setup.conditions import TYPE_B_UNSTATED
@@ -150,7 +151,7 @@ def not_stated(
         moved = {name: size * abs(float(np.nan_to_num(s.change[k]))) / u for k, name, _, _, u in figures if u > 0.0}
         far = sorted((n for n, v in moved.items() if v > 1.0), key=lambda n: -moved[n])[:3]
         if far:
-            said.append(f"{words} ({', '.join(f'{n} by {moved[n]:.2g} u' for n in far)})")
+            said.append(f"{words} ({', '.join(f'{n} by {plain(moved[n])} u' for n in far)})")
     text = (
         f"No residual of this record would show: {'; '.join(said)}. State that units and scales were checked "
         "(arrangement = checked)."

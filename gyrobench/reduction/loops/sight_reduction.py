@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops import sight_budget
 from gyrobench.reduction.loops.jitter import Spectra, root, shortest, widths
 from gyrobench.reduction.loops.loop_toolkit import Gate, LoopReduction, Response, Table
@@ -173,8 +174,9 @@ class SightReduction(LoopReduction):
             if not why and self._stuck():
                 why = "dry friction sticks for a part of the ride and slips in another"
             text = (
-                f"The jitter budget gives {whole / MICRO:.3g} µrad, the co-simulation {measured / MICRO:.3g} µrad"
-                f"{': ' + why if why else ''}. Believe the co-simulation; no allowance by source is stated."
+                f"The jitter budget gives {plain(whole / MICRO, 3)} µrad, the co-simulation "
+                f"{plain(measured / MICRO, 3)} µrad{': ' + why if why else ''}. Believe the co-simulation; no "
+                "allowance by source is stated."
             )
             self.found.warn("budget.not_linear", text)
         else:
@@ -194,7 +196,7 @@ class SightReduction(LoopReduction):
             text = (
                 f"{share:.0f} % of the variance of the jitter is {source}. With {axis} at an angle, a roll of the "
                 f"outer gimbal turns the line of sight whatever the bearings: the {other} motor must follow it with "
-                f"{tan:.2g} times its rate, and what the loop leaves of that is jitter. It is the largest where the "
+                f"{plain(tan)} times its rate, and what the loop leaves of that is jitter. It is the largest where the "
                 "inner joint stands farthest from 0: a wider loop or a third axis, of roll, makes it less."
             )
             self.found.warn("roll.askew", text)

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.estimation.sentences import told
+from gyrobench.reduction.estimation.sentences import plain, told
 from gyrobench.reduction.loops.loop_curves import over_time
 from gyrobench.reduction.loops.loop_measures import Gate
 from gyrobench.reduction.loops.loop_reduction import LoopReduction
@@ -71,9 +71,9 @@ class TrackingMeasures(LoopReduction):
             return []
         low, high = found["inside"].interval
         if high == FULL:
-            return [f"It is inside the wanted accuracy for {low:.3g} % of the time or more (95 %)."]
+            return [f"It is inside the wanted accuracy for {plain(low, 3)} % of the time or more (95 %)."]
         if low == 0.0:
-            return [f"It is inside the wanted accuracy for {high:.2g} % of the time or less (95 %)."]
+            return [f"It is inside the wanted accuracy for {plain(high)} % of the time or less (95 %)."]
         return told(self.found.coefficients, "It is inside the wanted accuracy for {inside} of the time.")
 
     def acquire(self, gate: Gate) -> None:
@@ -94,7 +94,7 @@ class TrackingMeasures(LoopReduction):
         none = none or ("" if at is not None else "within 5 % it does not settle in the step")
         u_t = None if at is None else math.hypot(step.u_settled, self._crossing(gate, k, at))
         if at is not None and u_t is not None and u_t > UNSURE * at:
-            none = none or f"noise moves the time at which it comes within 5 % by {u_t:.2g} s (rms)"
+            none = none or f"noise moves the time at which it comes within 5 % by {plain(u_t)} s (rms)"
         found.measure(f"t_5 {axis}", "settling of that step within 5 %", "s", at, u_t, no_value=none)
 
     def _crossing(self, gate: Gate, k: int, at: float) -> float:
@@ -166,7 +166,7 @@ class TrackingMeasures(LoopReduction):
         lost = [g for g in found.gates if np.any(g["tracker.lost"] > 0.5)]
         if lost:
             share = {g.label: 100.0 * float(np.mean(g["tracker.lost"] > 0.5)) for g in lost}
-            where = ", ".join(f"{label} ({s:.2g} % of it)" for label, s in share.items())
+            where = ", ".join(f"{label} ({plain(s)} % of it)" for label, s in share.items())
             text = (
                 f"The target was lost in: {where}. The loop was open then, and the line of sight went on with the rate "
                 "it had: errors, margins and the budget of these phases are not those of a tracker that sees."

@@ -21,6 +21,7 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.record.frequency_response import poles, unstable
 from gyrobench.record.run_document import LinearModels
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.loops.loop_measures import Gate
 
 PARTS = 8  # of a hold
@@ -49,8 +50,12 @@ def why_void(linear: LinearModels, gates: Sequence[Gate]) -> str:
 def describe(pole: complex) -> str:
     """Return a growing pole (rad/s) as text: its frequency and the factor by which it grows in a second."""
     rate = math.exp(min(pole.real, 700.0))
-    factor = f"{rate:.3g}" if rate < 1e6 else f"10^{pole.real / math.log(10.0):.0f}"
-    at = f"pole at {abs(pole.imag) / (2.0 * math.pi):.3g} Hz" if pole.imag else f"pole at {pole.real:+.3g} 1/s"
+    factor = plain(rate, 3) if rate < 1e6 else f"10^{pole.real / math.log(10.0):.0f}"
+    at = (
+        f"pole at {plain(abs(pole.imag) / (2.0 * math.pi), 3)} Hz"
+        if pole.imag
+        else f"pole at {plain(pole.real, 3, '+')} 1/s"
+    )
     return f"{at}, grows by a factor of {factor} per s"
 
 
@@ -105,7 +110,7 @@ def _restless(t: Array, y: Array, linear: LinearModels) -> str:
     sizes = np.array([float(np.std(p)) for p in parts])
     if sizes[-1] > GROWTH * sizes[0] > 0.0 and np.all(np.diff(sizes) > 0.0):
         rate = math.log(sizes[-1] / sizes[0]) / float(t[(PARTS - 1) * n] - t[0])
-        return f"grows by a factor of {math.exp(min(rate, 700.0)):.3g} per s"
+        return f"grows by a factor of {plain(math.exp(min(rate, 700.0)), 3)} per s"
     whole = _straightened(y)
     spectrum = np.abs(np.fft.rfft(whole * np.hanning(whole.size)))
     peak = int(np.argmax(spectrum))
@@ -127,7 +132,7 @@ def _restless(t: Array, y: Array, linear: LinearModels) -> str:
     steady = abs(np.mean(np.array(phasors) / amplitudes)) > STEADY
     if not steady or float(amplitudes.std()) > EVEN * mean or _undamped(linear, w):
         return ""
-    return f"oscillates by ±{mean:.3g} at {w / (2.0 * math.pi):.3g} Hz (limit cycle)"
+    return f"oscillates by ±{plain(mean, 3)} at {plain(w / (2.0 * math.pi), 3)} Hz (limit cycle)"
 
 
 def _straightened(y: Array) -> Array:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
 from gyrobench.reduction.noise_model.constancy import TermOverTime, over_time
 from gyrobench.reduction.noise_model.ordinates import Model, allan, size_of, spectrum, split
@@ -243,17 +244,18 @@ def _filter_words(name: str, p: Array, tau0: float) -> str:
         return f"low-pass of first order, time constant {_seconds(tau0 * math.exp(p[0]))}"
     if name in ("second", "recursive"):
         kind = "low-pass" if name == "second" else "recursive digital low-pass"
-        return f"{kind} of second order, {math.exp(p[0]) / (2.0 * math.pi * tau0):.3g} Hz, damping {math.exp(p[1]):.2g}"
+        at, damping = plain(math.exp(p[0]) / (2.0 * math.pi * tau0), 3), plain(math.exp(p[1]))
+        return f"{kind} of second order, {at} Hz, damping {damping}"
     if name == "butterworth":
-        return f"digital low-pass, {_cutoff(p[0], tau0):.3g} Hz, order {math.exp(p[1]):.2g}"
+        return f"digital low-pass, {plain(_cutoff(p[0], tau0), 3)} Hz, order {plain(math.exp(p[1]))}"
     if name == "cascade":
-        return f"{math.exp(p[1]):.2g} digital low-passes in a row of {_cutoff(p[0], tau0):.3g} Hz each"
+        return f"{plain(math.exp(p[1]))} digital low-passes in a row of {plain(_cutoff(p[0], tau0), 3)} Hz each"
     if name == "average":
         return f"mean over {_seconds(tau0 * math.exp(p[0]))}"
     if name.startswith(tuple(MEANS)):
         return f"{'two means' if name.startswith('bartlett') else 'mean'} over {samples_of(name)} samples"
     level = float(np.exp(-2.0 * np.sum(p[::2])))
-    return f"smooth shape of {name[5:]} terms, {10.0 * math.log10(level):.2g} dB at half the sampling rate"
+    return f"smooth shape of {name[5:]} terms, {plain(10.0 * math.log10(level))} dB at half the sampling rate"
 
 
 def _cutoff(log_t: float, tau0: float) -> float:
@@ -262,4 +264,4 @@ def _cutoff(log_t: float, tau0: float) -> float:
 
 
 def _seconds(t: float) -> str:
-    return f"{t:.3g} s" if t >= 1.0 else f"{1e3 * t:.3g} ms"
+    return f"{plain(t, 3)} s" if t >= 1.0 else f"{plain(1e3 * t, 3)} ms"

@@ -42,7 +42,7 @@ from gyrobench.reduction.noise_model.sensor_filters import (
     poisson,
     samples_of,
     second_poles,
-)  # fmt: skip
+)
 
 PEAKS = ("resonance", "band")
 SLOW = ("gauss_markov", "flicker", "walk")

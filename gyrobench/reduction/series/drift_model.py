@@ -29,6 +29,7 @@ from typing import TypeVar
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.series import gauss_markov as markov
 from gyrobench.reduction.series import stationarity
 from gyrobench.reduction.series.arima import Arima310, arima310
@@ -178,15 +179,15 @@ def _limits(m: DriftModel) -> list[str]:
     out = []
     if m.factor > 1:
         out.append(
-            f"The models describe means over {m.factor} samples ({m.model_dt:.4g} s): the record of {m.n} samples is "
-            f"longer than the {MODEL_SAMPLES} values they are fitted to."
+            f"The models describe means over {m.factor} samples ({plain(m.model_dt, 4)} s): the record of {m.n} "
+            f"samples is longer than the {MODEL_SAMPLES} values they are fitted to."
         )
     if not m.lines.complete:
         out.append(f"{len(m.lines.lines)} lines were removed; there may be more.")
     if moving := [line for line in m.lines.lines if not line.steady]:
         out.append(
-            f"The line at {moving[0].frequency:.4g} Hz changes its frequency or amplitude during the record; only its "
-            "steady part was removed."
+            f"The line at {plain(moving[0].frequency, 4)} Hz changes its frequency or amplitude during the record; "
+            "only its steady part was removed."
         )
     if m.gauss_markov is not None and (limit := markov.check_length(m.gauss_markov)):
         out.append(f"Correlation time: {limit}.")
@@ -197,10 +198,10 @@ def _limits(m: DriftModel) -> list[str]:
         )
     if m.burg is not None and not m.burg.long_enough:
         out.append(
-            f"The record has {m.burg.times:.3g} correlation times of the autoregression; its intervals need 20 and may "
-            "not cover."
+            f"The record has {plain(m.burg.times, 3)} correlation times of the autoregression; its intervals need 20 "
+            "and may not cover."
         )
     if m.normality is not None and not math.isfinite(m.normality.p):
         worth = min(m.normality.effective)
-        out.append(f"Normality is not decided: the correlated record is worth {worth:.3g} independent values.")
+        out.append(f"Normality is not decided: the correlated record is worth {plain(worth, 3)} independent values.")
     return out

@@ -24,6 +24,7 @@ from scipy.linalg import lapack
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.estimation import noise
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.series.checks import checked, checked_step
 
@@ -235,5 +236,5 @@ def check_length(found: GaussMarkovEstimate) -> str | None:
     if not found.determined:
         return "no correlated part beside white noise: a correlation time is not determined"
     if math.isinf(found.high) or times < 20.0:
-        return f"the record has {times:.3g} correlation times; 20 are needed for more than an order of magnitude"
+        return f"the record has {plain(times, 3)} correlation times; 20 are needed for more than an order of magnitude"
     return None

@@ -12,6 +12,7 @@ import numpy as np
 from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup.settling import unsettled
 from gyrobench.result import Coefficient, Reason, Result
 
@@ -49,7 +50,7 @@ def applied(result: R, record: Record) -> R:
         return result
     mean, parameters = float(np.mean(read)), record.run.parameters
     simulated = any(name.startswith("surroundings.") for name in parameters)
-    shown = f"{mean:.3g} K above that of the gyro's coefficients" if simulated else f"{mean - 273.15:.2f} °C"
+    shown = f"{plain(mean, 3)} K above that of the gyro's coefficients" if simulated else f"{mean - 273.15:.2f} °C"
     sentence = f"Constant drift belongs to the mean temperature of the record, {shown}."
     coefficients = [_warmed(c, parameters, mean) if simulated else c for c in result.coefficients]
     return replace(result, conventions=[*result.conventions, sentence], coefficients=coefficients)
@@ -87,7 +88,7 @@ def reasons(record: Record) -> list[Reason]:
         )
         found.append(Reason(TYPE_B_UNSTATED, text, blocks=("pass",), severity="doubt"))
     if not run.complete:
-        text = f"The run stopped at {run.stopped_at or 0.0:.6g} s, before the end of its plan."
+        text = f"The run stopped at {plain(run.stopped_at or 0.0, 6)} s, before the end of its plan."
         found.append(Reason("record.incomplete", text, blocks=("pass", "fail"), severity="error"))
     return found
 

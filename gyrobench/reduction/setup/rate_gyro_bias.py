@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.result import Reason
 from gyrobench.units import DPH
 
@@ -83,8 +84,8 @@ def unanswered(parameters: Mapping[str, Any]) -> list[Reason]:
     if not band:
         return []
     text = (
-        f"The gyro does not answer rates within ±{band:.3g} °/h (dead band, lock-in), and less of those beyond: the "
-        "Earth rate that is taken off was not read, and what is found is off by up to all of it."
+        f"The gyro does not answer rates within ±{plain(band, 3)} °/h (dead band, lock-in), and less of those beyond: "
+        "the Earth rate that is taken off was not read, and what is found is off by up to all of it."
     )
     return [Reason("gyro.unanswered", text, ("pass", "fail"), severity="doubt")]
 
@@ -95,7 +96,7 @@ def worded(parameters: Mapping[str, Any], u: float) -> list[Reason]:
     if not off > u:
         return []
     text = (
-        f"The words of the gyro are larger than their noise: a reading is off by {off / DPH:.3g} °/h rms, alike each "
-        "time it is taken, which u holds in part."
+        f"The words of the gyro are larger than their noise: a reading is off by {plain(off / DPH, 3)} °/h rms, alike "
+        "each time it is taken, which u holds in part."
     )
     return [Reason("gyro.words", text, ("pass", "fail"), severity="doubt")]

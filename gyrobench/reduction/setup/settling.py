@@ -24,6 +24,7 @@ from scipy import special
 
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.result import Reason
 
 DWELLS = 8  # least number
@@ -90,6 +91,6 @@ def _said(name: str, by_mean: bool, ends: Array) -> str:
     k = int(np.argmax(np.abs(mean) if by_mean else scatter))
     which, others = ("first", "last") if k == 0 else ("last", "first")
     if by_mean:
-        off = f"{mean[k] / scatter[1 - k]:+.2g}".replace("-", "−")
+        off = plain(mean[k] / scatter[1 - k], 2, "+").replace("-", "−")
         return f"{name}: the {which} one lies {off} standard deviations off"
-    return f"{name}: the {which} ones scatter {scatter[k] / scatter[1 - k]:.2g} times the {others} ones"
+    return f"{name}: the {which} ones scatter {plain(scatter[k] / scatter[1 - k])} times the {others} ones"

@@ -21,6 +21,7 @@ from gyrobench.arrays import Array
 from gyrobench.attitudes import parse
 from gyrobench.component.set_up import Errors
 from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.setup.run_metadata import Location, Remount, phases, remount_of, sizes
 from gyrobench.reduction.setup.simulated_errors import simulated_errors
 from gyrobench.reduction.setup.stops import REST, stop_problems
@@ -149,7 +150,7 @@ class RebalanceSetup(SiteSetup):
             "Drift ω_d in precession sign; for the sign of an indicated rate invert the sign of all coefficients.",
             "X, Y, Z = −f/g0 along the input, output and spin reference axes (sign of Hu 1981: a body axis that "
             "points up reads −1); g0 = 9.80665 m/s². Against +f/g0 the linear coefficients change sign.",
-            f"Torquer current: {sign}; k = {k * 1e-3 / units.DPH:.6g} °/h/mA.",
+            f"Torquer current: {sign}; k = {plain(k * 1e-3 / units.DPH, 6)} °/h/mA.",
         ]
 
 
@@ -239,7 +240,7 @@ class TurningSetup(RebalanceSetup):
                 problems += [where + text for text in stop_problems(*(c[phase == p] for c in (start, end, *times)))]
             elif not self.turns(p):
                 if largest > 1e-2:
-                    problems.append(f"{where}the table turns by {math.degrees(largest):.3g}° in a dwell")
+                    problems.append(f"{where}the table turns by {plain(math.degrees(largest), 3)}° in a dwell")
             elif largest < 1e-3:
                 text = f"{where}the table angle does not move, expected a turning table (rate 0?)"
                 if np.ptp(start[phase == p]) > REST:
@@ -247,7 +248,7 @@ class TurningSetup(RebalanceSetup):
                 problems.append(text)
             elif largest > 2.0 * math.pi / 5.0 * 1.001:
                 problems.append(
-                    f"{where}{2 * math.pi / largest:.2g} windows a turn, at least 5 are needed for two harmonics"
+                    f"{where}{plain(2 * math.pi / largest)} windows a turn, at least 5 are needed for two harmonics"
                 )
         return problems
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.sentences import plain
 
 #: rad; a table at rest creeps less in a window, and its stops are farther apart
 REST = 1e-3
@@ -43,7 +44,7 @@ def stop_problems(start: Array, end: Array, t_start: Array, t_end: Array) -> lis
     """
     creep = float(np.max(np.abs(end - start)))
     if creep > REST:
-        turned = f"{math.degrees(creep):.3g}° in a window"
+        turned = f"{plain(math.degrees(creep), 3)}° in a window"
         return [f"the table turns by {turned}, expected at rest at its stops; of a turning table state stops = 0"]
     angles = rests(start, end)
     if angles.size < 5:
@@ -51,6 +52,6 @@ def stop_problems(start: Array, end: Array, t_start: Array, t_end: Array) -> lis
     moved = np.abs(end[1:] - end[:-1]) > REST
     if np.any(hasty := moved & (t_start[1:] <= t_end[:-1])):
         k = int(np.argmax(hasty))
-        way = math.degrees(abs(float(end[k + 1] - end[k])))
-        return [f"the table moves by {way:.4g}° at t = {t_end[k]:.9g} s in no time, expected windows at rest alone"]
+        way, at = plain(math.degrees(abs(float(end[k + 1] - end[k]))), 4), plain(t_end[k], 9)
+        return [f"the table moves by {way}° at t = {at} s in no time, expected windows at rest alone"]
     return []

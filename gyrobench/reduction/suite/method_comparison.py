@@ -17,7 +17,7 @@ from typing import Any
 
 from gyrobench import drift, result_suite
 from gyrobench.record.run_document import RunDocument, SuiteTestRun
-from gyrobench.reduction.estimation.sentences import p_text
+from gyrobench.reduction.estimation.sentences import p_text, plain
 from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.reduction.suite import consistency, estimable_combinations
@@ -77,7 +77,9 @@ class MeasurandComparison:
         if self.found is None:
             return "one method only" if len(self.values) == 1 else "not tested: no noise"
         significant = [
-            f"{p.a} and {p.b} ({p.E_n:.3g})" for p in sorted(self.found.pairs, key=lambda p: -p.E_n) if p.E_n > 1.0
+            f"{p.a} and {p.b} ({plain(p.E_n, 3)})"
+            for p in sorted(self.found.pairs, key=lambda p: -p.E_n)
+            if p.E_n > 1.0
         ]
         if not self.disagree:
             return f"consistent; E_n > 1: {', '.join(significant)}" if significant else "consistent"
@@ -85,8 +87,8 @@ class MeasurandComparison:
             label, p = self.outlier
             others = consistency.combine_values([v for v in self.values if v.label != label])
             deviation = next(v for v in self.values if v.label == label).estimate - others.mean
-            size = f"{deviation:+.2g} {self.quantity.unit}".replace("-", "−")
-            return f"{label} deviates by {size}; the others are consistent (p = {p:.2g})"
+            size = f"{plain(deviation, 2, '+')} {self.quantity.unit}".replace("-", "−")
+            return f"{label} deviates by {size}; the others are consistent (p = {plain(p)})"
         which = "; the deviating method cannot be identified" if len(self.values) < 3 or len(significant) < 2 else ""
         return f"inconsistent: {', '.join(f'E_n of {x}' for x in significant) or 'no single pair'}{which}"
 
@@ -303,7 +305,7 @@ def _summary(suite: SuiteComparison, compared: Sequence[MeasurandComparison]) ->
     return [
         f"{first}; smallest adjusted {p_text(suite.p or 0.0)}.",
         *(f"{c.quantity.name}: {c.words()}." for c in compared if c.disagree),
-        f"E_n > 1 in {suite.pairs_apart} of {many} pairs; about {0.05 * many:.2g} are expected by chance.",
+        f"E_n > 1 in {suite.pairs_apart} of {many} pairs; about {plain(0.05 * many)} are expected by chance.",
     ]
 
 
