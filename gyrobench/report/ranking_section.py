@@ -10,6 +10,7 @@ from gyrobench.reduction.estimation.uncertainty import NORMAL
 from gyrobench.reduction.suite.ranking import RankedValue, rank
 from gyrobench.report.page_model import BulletList, Column, PageTable, Row, Section, Text, number_cell, text_cell
 from gyrobench.report.replicates import ComparedRun, Draws
+from gyrobench.report.result_json import value_at
 from gyrobench.result import Coefficient
 
 Json = dict[str, Any]
@@ -119,27 +120,22 @@ def _places(doc: Json, letters: Sequence[str]) -> PageTable:
 
 
 def _table(doc: Json, path: tuple[str | int, ...], caption: str, letters: Sequence[str]) -> PageTable:
-    ranked = doc
-    for key in path:
-        ranked = ranked[key]  # type: ignore[index]
+    ranked = value_at(doc, *path)
     several = len({run["instrument"] for run in doc["runs"]}) > 1
     rows = []
     for index, entry in enumerate(ranked["order"]):
         run, at = doc["runs"][entry["run"]], (*path, "order", index)
-        rows.append(
-            Row(
-                [
-                    text_cell(place_text(ranked, entry), "strong"),
-                    text_cell(letters[entry["run"]]),
-                    text_cell(run["name"]),
-                    *([text_cell(run["instrument"])] if several else []),
-                    number_cell(doc, (*at, "value"), entry["u"]),
-                    number_cell(doc, (*at, "u"), entry["u"]),
-                    number_cell(doc, (*at, "over_best"), significant=3),
-                    text_cell(probability_text(entry)),
-                ]
-            )
-        )
+        cells = [
+            text_cell(place_text(ranked, entry), "strong"),
+            text_cell(letters[entry["run"]]),
+            text_cell(run["name"]),
+            *([text_cell(run["instrument"])] if several else []),
+            number_cell(doc, (*at, "value"), entry["u"]),
+            number_cell(doc, (*at, "u"), entry["u"]),
+            number_cell(doc, (*at, "over_best"), significant=3),
+            text_cell(probability_text(entry)),
+        ]
+        rows.append(Row(cells))
     for entry in ranked["void"]:
         run = doc["runs"][entry["run"]]
         known = [text_cell("–"), text_cell(letters[entry["run"]]), text_cell(run["name"])]

@@ -98,21 +98,18 @@ def _consistency(report: Report[SuiteResult]) -> list[Any]:
             continue
         path: tuple[str | int, ...] = ("suite", "quantities", k)
         inconsistent = q.verdict == "disagree"
-        rows.append(
-            Row(
-                [
-                    text_cell(q.name, "strong"),
-                    text_cell("".join(letters[v.label] for v in q.values)),
-                    number_cell(doc, (*path, "Q"), significant=3),
-                    number_cell(doc, (*path, "dof")),
-                    number_cell(doc, (*path, "birge"), significant=3),
-                    number_cell(doc, (*path, "p"), write=write_p),
-                    number_cell(doc, (*path, "p_adjusted"), write=write_p, mark="warn" if inconsistent else ""),
-                    number_cell(doc, (*path, "largest E_n"), significant=3),
-                    text_cell(q.words, "warn" if inconsistent else ""),
-                ]
-            )
-        )
+        cells = [
+            text_cell(q.name, "strong"),
+            text_cell("".join(letters[v.label] for v in q.values)),
+            number_cell(doc, (*path, "Q"), significant=3),
+            number_cell(doc, (*path, "dof")),
+            number_cell(doc, (*path, "birge"), significant=3),
+            number_cell(doc, (*path, "p"), write=write_p),
+            number_cell(doc, (*path, "p_adjusted"), write=write_p, mark="warn" if inconsistent else ""),
+            number_cell(doc, (*path, "largest E_n"), significant=3),
+            text_cell(q.words, "warn" if inconsistent else ""),
+        ]
+        rows.append(Row(cells))
     if not rows:
         return [Text("No measurand is determined by two methods.")]
     heads = ("measurand", "methods", "Q", "dof", "Birge ratio", "p", "p, adjusted", "largest E_n")
@@ -137,18 +134,15 @@ def _cross(report: Report[SuiteResult]) -> list[Any]:
         rows.append(heading(f"{q.name} in {q.unit}{true}"))
         for j, v in enumerate(q.values):
             own = (*path, "values", j)
-            rows.append(
-                Row(
-                    [
-                        text_cell(v.label),
-                        *(number_cell(doc, (*own, n), v.u) for n in ("estimate", "u", "U")),
-                        *(number_cell(doc, (*own, n), v.u) for n in split),
-                        number_cell(doc, (*own, "dof"), significant=3),
-                        number_cell(doc, (*own, "weight"), significant=3),
-                        text_cell(v.how),
-                    ]
-                )
-            )
+            cells = [
+                text_cell(v.label),
+                *(number_cell(doc, (*own, n), v.u) for n in ("estimate", "u", "U")),
+                *(number_cell(doc, (*own, n), v.u) for n in split),
+                number_cell(doc, (*own, "dof"), significant=3),
+                number_cell(doc, (*own, "weight"), significant=3),
+                text_cell(v.how),
+            ]
+            rows.append(Row(cells))
         if q.mean:
             u = q.mean.u
             mean = [number_cell(doc, (*path, "mean", n), u) for n in ("estimate", "u", "U")]
@@ -231,16 +225,13 @@ def _pairs(report: Report[SuiteResult]) -> list[Any]:
             p = pairs[k]
             path: tuple[str | int, ...] = ("suite", "pairs", k)
             mark = "warn" if p.E_n > 1.0 else ""
-            pair_rows.append(
-                Row(
-                    [
-                        text_cell(f"{p.a} − {p.b}"),
-                        number_cell(doc, (*path, "difference"), p.U / 2.0 if p.U else None),
-                        number_cell(doc, (*path, "U"), p.U),
-                        number_cell(doc, (*path, "E_n"), 0.01, mark=mark),
-                    ]
-                )
-            )
+            cells = [
+                text_cell(f"{p.a} − {p.b}"),
+                number_cell(doc, (*path, "difference"), p.U / 2.0 if p.U else None),
+                number_cell(doc, (*path, "U"), p.U),
+                number_cell(doc, (*path, "E_n"), 0.01, mark=mark),
+            ]
+            pair_rows.append(Row(cells))
     columns = [Column("pair", wide=True), Column("difference"), Column("U of the difference (95 %)"), Column("E_n")]
     table = PageTable(columns, pair_rows, "Normalized errors of all pairs.", small=True)
     return [matrix, CollapsedBlocks(f"All {len(pairs)} pairs", [table])]
@@ -312,18 +303,15 @@ def _provenance(report: Report[SuiteResult]) -> list[Any]:
     for k, m in enumerate(members):
         test = _test(m)
         changed = ", ".join(test.changed) or "nothing"
-        rows.append(
-            Row(
-                [
-                    text_cell(m.label, "strong"),
-                    number_cell(doc, ("suite", "members", k, "seed")),
-                    number_cell(doc, ("suite", "members", k, "step")),
-                    text_cell(test.engine),
-                    text_cell(_versions(test.versions)),
-                    text_cell(changed if len(changed) < 160 else changed[:157] + "…"),
-                ]
-            )
-        )
+        cells = [
+            text_cell(m.label, "strong"),
+            number_cell(doc, ("suite", "members", k, "seed")),
+            number_cell(doc, ("suite", "members", k, "step")),
+            text_cell(test.engine),
+            text_cell(_versions(test.versions)),
+            text_cell(changed if len(changed) < 160 else changed[:157] + "…"),
+        ]
+        rows.append(Row(cells))
         for what, sha in (("record", test.record_sha256), ("result", test.result_sha256)):
             if sha:
                 hashes.append(Row([text_cell(m.label, "strong"), text_cell(what), Cell(sha, mark="hash")]))

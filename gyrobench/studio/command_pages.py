@@ -18,8 +18,8 @@ from nicegui.events import UploadEventArguments
 from gyrobench.bench import UsageError, display_path
 from gyrobench.report.language import ENGLISH
 from gyrobench.studio.data_page import keep
-from gyrobench.studio.frame import FILES, CopyLines, Studio, dropped, frame, given_in_address, inside, told
-from gyrobench.studio.request import CommandRequest
+from gyrobench.studio.frame import CopyLines, Studio, dropped, frame, given_in_address, inside, told
+from gyrobench.studio.request import FILES, CommandRequest
 from gyrobench.studio.run_page import report_frame
 from gyrobench.studio.words import heading, say
 from gyrobench.system.system import load_system

@@ -20,20 +20,9 @@ from gyrobench.files import write_whole
 from gyrobench.reading import visible
 from gyrobench.record.column_proposal import FileColumn
 from gyrobench.record.text_cells import cells_of_file
-from gyrobench.studio.frame import (
-    FILES,
-    CopyLines,
-    Studio,
-    dropped,
-    frame,
-    given_in_address,
-    inside,
-    pairs_in_address,
-    shown,
-    told,
-)
-from gyrobench.studio.request import KEPT, JobRequest
-from gyrobench.studio.words import content, heading, say, spoken
+from gyrobench.studio.frame import CopyLines, Studio, dropped, frame, given_in_address, inside, pairs_in_address, told
+from gyrobench.studio.request import FILES, KEPT, JobRequest
+from gyrobench.studio.words import content, heading, say, shown, spoken
 from gyrobench.system.system import System
 from gyrobench.workflow.fit_columns import ColumnProposal, propose_columns
 from gyrobench.workflow.gallery import gallery

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import re
-import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from html import escape
@@ -15,15 +13,13 @@ from urllib.parse import quote
 from nicegui import app, ui
 from nicegui.events import Handler, UploadEventArguments
 
-from gyrobench.bench import Bench, UsageError, display_path
-from gyrobench.files import TEMPORARY
+from gyrobench.bench import Bench, UsageError
 from gyrobench.reading import visible
 from gyrobench.studio.gate import UPLOAD
 from gyrobench.studio.jobs import StudioJobs
-from gyrobench.studio.words import NAMES, content, say, spoken
+from gyrobench.studio.words import NAMES, content, say, shown, spoken
 from gyrobench.workflow.user_errors import user_message
 
-FILES = Path("studio", "files")  # that were dropped, below reports/out
 MARK = "#0b5cad"  # of buttons: white on it is read at 4.5:1 and better
 STYLE = Path(__file__).with_name("studio.css")
 NARROW = Path(__file__).with_name("narrow.js")
@@ -136,16 +132,6 @@ class PageSeen:
         self.now = True
         ui.on("seen", lambda e: setattr(self, "now", bool(e.args)))
         ui.run_javascript(SEEN)
-
-
-def shown(text: str) -> str:
-    """Return what the bench says as a page shows it: files that were dropped by their own names, without the folders
-    that keep them and those of their texts for a while.
-    """
-    out = Bench.find().out
-    kept = "|".join(re.escape(f"{place}{os.sep}{FILES}{os.sep}") + r"\w+" for place in (out, display_path(out)))
-    text_of_log = re.escape(os.path.join(tempfile.gettempdir(), TEMPORARY)) + r"\w+[/\\]\w+"
-    return visible(re.sub(rf"({kept}|{text_of_log})[/\\]", "", text))
 
 
 def show_problem(error: BaseException) -> None:

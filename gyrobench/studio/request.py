@@ -5,11 +5,13 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any, ClassVar
 from urllib.parse import quote, urlencode
 
 from gyrobench.report.language import ENGLISH
 
+FILES = Path("studio", "files")  # that were dropped, below reports/out
 FIRST = 4  # signals shown at first
 KEPT = "kept"  # in an address: the columns as the map beside the file has them
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import shlex
 from html import escape
 from pathlib import Path
@@ -15,25 +16,15 @@ from gyrobench.bench import UsageError, display_path
 from gyrobench.record.run_document import RunDocument, SuiteDocument, read_run
 from gyrobench.report.language import ENGLISH
 from gyrobench.studio.chart import LiveChart, RecordSignals, SignalChart, signals_of
-from gyrobench.studio.frame import (
-    CopyLines,
-    PageSeen,
-    Studio,
-    address,
-    counted,
-    frame,
-    inside,
-    search_field,
-    shown,
-    told,
-)
+from gyrobench.studio.frame import CopyLines, PageSeen, Studio, address, counted, frame, inside, search_field, told
 from gyrobench.studio.job_process import LIVE
 from gyrobench.studio.jobs import StudioJob
 from gyrobench.studio.picture import MovingPicture
 from gyrobench.studio.request import CommandRequest, JobRequest, comparison_command, comparison_python, first_shown
-from gyrobench.studio.words import content, heading, say, spoken
+from gyrobench.studio.words import content, heading, say, shown, spoken
 from gyrobench.system.moving_bodies import parse_bodies
 from gyrobench.system.suite import Suite
+from gyrobench.system.system import System
 from gyrobench.workflow.inputs import load_test
 from gyrobench.workflow.run_comparison import compare_folders, comparison_folder
 from gyrobench.workflow.run_folders import short_names
@@ -53,19 +44,16 @@ def add_run_pages(studio: Studio) -> None:
 
 
 # ---------------------------------------------------------------------------------------------- a job
-def _is_suite(name: str) -> bool:
-    try:
-        return isinstance(load_test(name), Suite)
-    except Exception:  # it was there when the job was made
-        return False
+def _test(name: str) -> System | Suite | None:
+    """Return a system or suite; None for a command, and for one that is not there any more, or that has a fault."""
+    with contextlib.suppress(Exception):
+        return load_test(name)
+    return None
 
 
 def _title(request: JobRequest | CommandRequest) -> str:
     """Return the title of what runs: that of its system, where it is a run of one."""
-    try:
-        return say(load_test(request.system).title, request.system) or request.system
-    except Exception:  # a command, or a system that is not there any more
-        return request.system
+    return say(getattr(_test(request.system), "title", ""), request.system) or request.system
 
 
 def _place(studio: Studio, folder: str) -> str:
@@ -98,7 +86,9 @@ def _add_job_page(studio: Studio) -> None:
                     ui.link(say("Change its values"), job.request.form).mark("change")
             chart = LiveChart(studio.jobs.folder / key / LIVE)
             lines = CopyLines()
-            lines.show(job.request.command(job.resume), job.request.python(_is_suite(job.request.system)))
+            lines.show(
+                job.request.command(job.resume), job.request.python(isinstance(_test(job.request.system), Suite))
+            )
             gone, seen = {"there": False}, PageSeen()
 
             def show() -> None:
@@ -245,10 +235,7 @@ async def _picture(folder: Path, document: RunDocument) -> None:
 
 
 def _shown_by_report(name: str) -> list[Any]:
-    try:
-        return list(getattr(load_test(name), "shown", ()))
-    except Exception:  # a run of a system that is not there any more
-        return []
+    return list(getattr(_test(name), "shown", ()))
 
 
 # ---------------------------------------------------------------------------------------------- all runs

@@ -12,8 +12,8 @@ from nicegui.events import UploadEventArguments
 from gyrobench.bench import display_path
 from gyrobench.files import write_whole
 from gyrobench.studio.data_page import keep
-from gyrobench.studio.frame import Studio, dropped, shown
-from gyrobench.studio.words import content, say
+from gyrobench.studio.frame import Studio, dropped
+from gyrobench.studio.words import content, say, shown
 from gyrobench.workflow.fit_mapping import write_mapping
 from gyrobench.workflow.user_errors import user_message
 

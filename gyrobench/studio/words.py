@@ -8,12 +8,19 @@ as such (lang="en").
 from __future__ import annotations
 
 import functools
+import os
+import re
+import tempfile
 from html import escape
 from pathlib import Path
 
 from nicegui import ui
 
+from gyrobench.bench import Bench, display_path
+from gyrobench.files import TEMPORARY
+from gyrobench.reading import visible
 from gyrobench.report.language import ENGLISH, Language, catalogue, check_code, codes, reports_there, system_folder
+from gyrobench.studio.request import FILES
 
 HERE = Path(__file__).parent
 NAMES = {"en": "English", "zh": "中文"}
@@ -59,6 +66,16 @@ def _found(code: str, system: str, text: str) -> str | None:
 
 
 say = _Words()
+
+
+def shown(text: str) -> str:
+    """Return what the bench says as a page shows it: files that were dropped by their own names, without the folders
+    that keep them and those of their texts for a while.
+    """
+    out = Bench.find().out
+    kept = "|".join(re.escape(f"{place}{os.sep}{FILES}{os.sep}") + r"\w+" for place in (out, display_path(out)))
+    text_of_log = re.escape(os.path.join(tempfile.gettempdir(), TEMPORARY)) + r"\w+[/\\]\w+"
+    return visible(re.sub(rf"({kept}|{text_of_log})[/\\]", "", text))
 
 
 def content(text: str, system: str = "") -> ui.label:

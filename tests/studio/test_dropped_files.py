@@ -12,7 +12,8 @@ from studio_requests import Door
 
 from gyrobench.bench import Bench
 from gyrobench.files import temporary_folder
-from gyrobench.studio.frame import FILES, shown
+from gyrobench.studio.request import FILES
+from gyrobench.studio.words import shown
 
 
 def test_a_message_names_a_dropped_file_without_the_folders_that_keep_it(

@@ -75,19 +75,16 @@ def _tests(doc: Json) -> PageTable:
         at = ("tests", i)
         mark = "significant" if t["beyond_chance"] else ""
         u = None if t["low"] is None or t["high"] is None else 0.25 * (t["high"] - t["low"])
-        rows.append(
-            Row(
-                [
-                    text_cell(t["name"], "strong"),
-                    text_cell(QUANTITIES[t["quantity"]]),
-                    text_cell("" if t["unit"] == "1" else t["unit"]),
-                    *(number_cell(doc, (*at, key), significant=4) for key in ("a", "b")),
-                    *(number_cell(doc, (*at, key), u, mark=mark, significant=3) for key in ("change", "low", "high")),
-                    number_cell(doc, (*at, "p_adjusted"), write=write_p),
-                    text_cell("beyond chance" if t["beyond_chance"] else "–", mark),
-                ]
-            )
-        )
+        cells = [
+            text_cell(t["name"], "strong"),
+            text_cell(QUANTITIES[t["quantity"]]),
+            text_cell("" if t["unit"] == "1" else t["unit"]),
+            *(number_cell(doc, (*at, key), significant=4) for key in ("a", "b")),
+            *(number_cell(doc, (*at, key), u, mark=mark, significant=3) for key in ("change", "low", "high")),
+            number_cell(doc, (*at, "p_adjusted"), write=write_p),
+            text_cell("beyond chance" if t["beyond_chance"] else "–", mark),
+        ]
+        rows.append(Row(cells))
     heads = ("name", "quantity", "unit", "A", "B", "B − A (u: B / A)", "95 % from", "to", "p, adjusted", "")
     how = (
         f"{doc['pairs']} runs of equal settings and seeds in pairs" if doc["pairs"] else "the campaigns are independent"

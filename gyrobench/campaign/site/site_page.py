@@ -161,15 +161,9 @@ def _instruments(doc: Json, reports: Callable[[str], str]) -> list[Any]:
 def _instrument(entry: Json, reports: Callable[[str], str], dated: bool, more: list[Cell]) -> Row:
     link = reports(entry["report"]) if entry["report"] else ""
     verdict = entry["verdict"]
-    return Row(
-        [
-            text_cell(entry["instrument"], "strong", link),
-            text_cell(_last(entry["data"]), own=True),
-            *([text_cell((entry["date"] or "–")[:10])] if dated else []),
-            text_cell(verdict, verdict, link),
-            *more,
-        ]
-    )
+    cells = [text_cell(entry["instrument"], "strong", link), text_cell(_last(entry["data"]), own=True)]
+    cells += [text_cell((entry["date"] or "–")[:10])] if dated else []
+    return Row([*cells, text_cell(verdict, verdict, link), *more])
 
 
 def _last(path: Any) -> str:
@@ -184,20 +178,17 @@ def _control(doc: Json, measures: CampaignMeasures) -> list[Any]:
     for i, t in enumerate(lot["tolerance"]):
         at = ("lot", "tolerance", i)
         sd = t["sd"]
-        rows.append(
-            Row(
-                [
-                    text_cell(t["name"], "strong"),
-                    text_cell(t["unit"]),
-                    number_cell(doc, (*at, "n")),
-                    *(number_cell(doc, (*at, key), sd and 0.1 * sd) for key in ("mean", "sd", "low", "high")),
-                    number_cell(doc, (*at, "u"), significant=2),
-                    text_cell(t["kind"] if t["low"] is not None else f"{t['kind']}: too few values"),
-                    number_cell(doc, (*at, "p_normal"), write=write_p),
-                    number_cell(doc, (*at, "beyond")),
-                ]
-            )
-        )
+        cells = [
+            text_cell(t["name"], "strong"),
+            text_cell(t["unit"]),
+            number_cell(doc, (*at, "n")),
+            *(number_cell(doc, (*at, key), sd and 0.1 * sd) for key in ("mean", "sd", "low", "high")),
+            number_cell(doc, (*at, "u"), significant=2),
+            text_cell(t["kind"] if t["low"] is not None else f"{t['kind']}: too few values"),
+            number_cell(doc, (*at, "p_normal"), write=write_p),
+            number_cell(doc, (*at, "beyond")),
+        ]
+        rows.append(Row(cells))
     heads = ("name", "unit", "n", "mean", "standard deviation", "95 % / 95 % from", "to", "median u", "interval",
              "p (normal)", "beyond control limits")  # fmt: skip
     table = PageTable(
@@ -237,20 +228,17 @@ def _changes(doc: Json) -> list[Any]:
         d = changes["drifts"][k]
         here = ("lot", "changes", "drifts", k)
         mark = "significant" if d["beyond_chance"] else ""
-        rows.append(
-            Row(
-                [
-                    text_cell(d["instrument"], "strong"),
-                    text_cell(d["name"]),
-                    number_cell(doc, (*here, "dates")),
-                    number_cell(doc, (*here, "slope"), d["u"], mark=mark),
-                    number_cell(doc, (*here, "u"), d["u"]),
-                    text_cell(f"{d['unit']} per day"),
-                    number_cell(doc, (*here, "p_adjusted"), write=write_p),
-                    text_cell("changed" if d["beyond_chance"] else "–", mark),
-                ]
-            )
-        )
+        cells = [
+            text_cell(d["instrument"], "strong"),
+            text_cell(d["name"]),
+            number_cell(doc, (*here, "dates")),
+            number_cell(doc, (*here, "slope"), d["u"], mark=mark),
+            number_cell(doc, (*here, "u"), d["u"]),
+            text_cell(f"{d['unit']} per day"),
+            number_cell(doc, (*here, "p_adjusted"), write=write_p),
+            text_cell("changed" if d["beyond_chance"] else "–", mark),
+        ]
+        rows.append(Row(cells))
     heads = ("instrument", "name", "dates", "drift", "u", "unit", "p, adjusted", "")
     drifts = PageTable(
         [Column(h) for h in heads],
@@ -268,16 +256,13 @@ def _failures(doc: Json) -> list[Any]:
     for i, f in enumerate(doc["failures"]):
         same = max(re.split(r'[\d"]+', f["reason"]), key=len).strip()  # the longest piece without a number
         words = quote(f'state={f["state"]} "{same}"', safe="")
-        rows.append(
-            Row(
-                [
-                    text_cell(f["state"], "strong"),
-                    number_cell(doc, ("failures", i, "runs")),
-                    text_cell(f["reason"]),
-                    text_cell("show", link=f"#filter={words}"),
-                ]
-            )
-        )
+        cells = [
+            text_cell(f["state"], "strong"),
+            number_cell(doc, ("failures", i, "runs")),
+            text_cell(f["reason"]),
+            text_cell("show", link=f"#filter={words}"),
+        ]
+        rows.append(Row(cells))
     columns = [Column("state"), Column("runs"), Column("reason (of the first)", wide=True), Column("")]
     return [PageTable(columns, rows, "Runs without result by reason; reasons that differ in numbers alone are one.")]
 

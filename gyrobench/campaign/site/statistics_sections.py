@@ -82,20 +82,17 @@ def responses_section(doc: Json) -> list[Any]:
     for k in order:
         e = doc["effects"][k]
         mark = "significant" if e["beyond_chance"] else ""
-        rows.append(
-            Row(
-                [
-                    text_cell(e["axis"], "strong"),
-                    text_cell(e["name"]),
-                    text_cell(e["quantity"]),
-                    number_cell(doc, ("effects", k, "span"), significant=3),
-                    text_cell(e["unit"]),
-                    number_cell(doc, ("effects", k, "share"), significant=2),
-                    number_cell(doc, ("effects", k, "p_adjusted"), write=write_p),
-                    text_cell("beyond chance" if e["beyond_chance"] else "–", mark),
-                ]
-            )
-        )
+        cells = [
+            text_cell(e["axis"], "strong"),
+            text_cell(e["name"]),
+            text_cell(e["quantity"]),
+            number_cell(doc, ("effects", k, "span"), significant=3),
+            text_cell(e["unit"]),
+            number_cell(doc, ("effects", k, "share"), significant=2),
+            number_cell(doc, ("effects", k, "p_adjusted"), write=write_p),
+            text_cell("beyond chance" if e["beyond_chance"] else "–", mark),
+        ]
+        rows.append(Row(cells))
     heads = ("axis", "name", "quantity", "span of means", "unit", "share of variance", "p, adjusted", "")
     table = PageTable(
         [Column(h) for h in heads],
