@@ -12,7 +12,7 @@ from gyrobench.campaign.analysis.axis_effects import main_effects, responses
 from gyrobench.campaign.analysis.coverage_counts import coverage
 from gyrobench.campaign.analysis.lots import analyse_lot
 from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, numbers
-from gyrobench.campaign.analysis.places import names_alone, without_folders
+from gyrobench.campaign.analysis.shown_files import names_alone, without_folders
 from gyrobench.campaign.analysis.sobol_indices import sobol_indices
 from gyrobench.report.numbers import write_number
 
@@ -28,7 +28,7 @@ PERCENTILES = {"min": 0.0, "q025": 2.5, "median": 50.0, "q975": 97.5, "max": 100
 def analyse(campaign: Campaign) -> Json:
     """Return the analysis of a stored campaign: states, distributions, coverage, responses, indices, lot, failures.
 
-    Files are called as a site does (:mod:`.places`).
+    Files are called as a site does (:mod:`.shown_files`).
     """
     rows = without_folders(campaign.table())
     measures = CampaignMeasures.of(rows, campaign.units, campaign.axes)

@@ -25,7 +25,7 @@ from gyrobench import reading
 from gyrobench.bench import Bench, UsageError
 from gyrobench.campaign.analysis.campaign_analysis import analyse
 from gyrobench.campaign.analysis.measures import CampaignMeasures, Json, error, numbers
-from gyrobench.campaign.analysis.places import without_folders
+from gyrobench.campaign.analysis.shown_files import without_folders
 from gyrobench.campaign.execution.store import Campaign, CampaignError
 from gyrobench.campaign.site.site_page import own_names, own_texts, page, recorded
 from gyrobench.files import write_whole
