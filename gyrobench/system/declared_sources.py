@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from gyrobench.bench import UsageError
-from gyrobench.reduction.setup.sources import declared
+from gyrobench.reduction.setup.sources import declared, known
 from gyrobench.system.families.option_groups import type_b
 
 if TYPE_CHECKING:
@@ -32,8 +32,7 @@ def misnamed_sources(system: System) -> list[str]:
         return []
     from gyrobench.reduction.estimation.effects import unknown_sources
 
-    system.reduction_object()  # declares the sources of its own
-    return unknown_sources(text)
+    return unknown_sources(text, known(system.reduction_object(), type(system).__module__))
 
 
 def require_options(system: System, reduction: Any, module: str) -> None:

@@ -26,7 +26,7 @@ from gyrobench.reading import shorten
 from gyrobench.reduction.estimation.findings import Findings
 from gyrobench.reduction.estimation.linear_fit import without
 from gyrobench.reduction.setup.run_metadata import Remount
-from gyrobench.reduction.setup.sources import KNOWN, RELATIVE, REMOUNT, Effect
+from gyrobench.reduction.setup.sources import RELATIVE, REMOUNT, Effect, Source
 from gyrobench.reduction.setup.window_checks import ReductionError
 from gyrobench.result import Table
 
@@ -83,13 +83,13 @@ def misstated(text: str) -> str:
     return f"corrections: '{shorten(wrong[0].strip())}' is not of the form {FORM}" if wrong else ""
 
 
-def unknown_sources(text: str) -> list[str]:
+def unknown_sources(text: str, known: Sequence[Source]) -> list[str]:
     """Return what is wrong with the sources that an option corrections names, as far as it is known before a run:
-    those that no declared source is called.  Which of the others a test has its data tell.
+    those that none of the known is called.  Which of the others a test has its data tell.
     """
     stated = [" ".join(one.rpartition("=")[0].split()) for one in text.split(";") if one.strip()]
-    names = [f"{s.name} ({part})" if part else s.name for s in KNOWN.values() for part in s.parts or ("",)]
-    return [_no_source(n, names) for n in stated if not any(s.names(n) for s in KNOWN.values())]
+    names = [f"{s.name} ({part})" if part else s.name for s in known for part in s.parts or ("",)]
+    return [_no_source(n, names) for n in stated if not any(s.names(n) for s in known)]
 
 
 def _no_source(source: str, known: Iterable[str]) -> str:

@@ -28,6 +28,7 @@ The way of a statement ``--set u_axis=60arcsec``:
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -46,8 +47,6 @@ PHASES = ("phase 0°", "phase 90°")  # of a wobble
 #: unit of a source that is relative to the reading (scale factor, nonlinearity, time base): its error holds the noise
 #: of the data, which a covariance would take for information about it
 RELATIVE = "1"
-#: (id, name) -> every source that a module which is loaded declares
-KNOWN: dict[tuple[str, str], Source] = {}
 STATED = "positive where the stated one is too large"
 
 
@@ -72,9 +71,6 @@ class Source:
     doc: str = ""
     default: float | str = 0.0
     parameter: str = ""
-
-    def __post_init__(self) -> None:
-        KNOWN[self.id, self.name] = self
 
     def names(self, text: str) -> bool:
         """Return whether a text is a name or an id of it, of one that is alike, or of a part of it."""
@@ -129,6 +125,14 @@ def declared(reduction: Any) -> dict[str, Source]:
             if isinstance(source := getattr(value, "source", None), Source):
                 found[name] = source
     return found
+
+
+def known(reduction: Any, package: str) -> list[Source]:
+    """Return the sources that a reduction declares, and those in the modules of its package and of the bench."""
+    modules = [m for n, m in [*sys.modules.items()] if n.startswith(("gyrobench.reduction", package))]
+    there = [v for m in modules for v in vars(m).values()]
+    there += [v for group in there if isinstance(group, dict) for v in group.values()]
+    return [*declared(reduction).values(), *(v for v in there if isinstance(v, Source))]
 
 
 @dataclass(frozen=True)
