@@ -250,6 +250,7 @@ class RunDocument(Document):
     problem: str = Field(default="", description="why the run is not complete")
     tables: dict[str, str] = Field(default_factory=dict, description="file of the record -> SHA-256")
     data: DataFile | None = None
+    doubts: list[str] = Field(default_factory=list, description="of measured data: why its readings bear no verdict")
     external: list[str] = Field(default_factory=list, description="of a run by another tool: what is not known of it")
     series: dict[str, Any] | None = Field(default=None, description="of a drift record: columns and acquisition, SI")
     days: list[Day] = Field(default_factory=list, description="of a record of several days")

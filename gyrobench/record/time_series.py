@@ -30,6 +30,8 @@ from gyrobench.record.sampling import Successive
 Block = Mapping[str, Array]
 BLOCK = 1 << 20  # bytes of text read at a time
 GAP = 1.5  # usual steps; a longer one is a gap
+EVEN, FARTHER, WRAPPED = 0.1, 1.6, 20.0  # of the usual rate of a table: scatter, of samples lost, of a turn begun anew
+MISSED = 3  # places of which is spoken
 
 
 @dataclass(frozen=True)
@@ -113,6 +115,7 @@ class Averager:
     step: float = 0.0  # usual step, s
     incomplete: int = 0  # rows left out
     gaps: int = 0
+    lost: int = 0  # samples that the angle shows, with the times closed up
     dropped: int = 0  # windows
     rest: dict[str, Array] = field(default_factory=dict)  # rows of the window that is not finished
     opened: tuple[float, float, int] | None = None  # time and angle at which its phase began, windows done
@@ -202,6 +205,8 @@ class Averager:
         for s in self.signals:
             for stretch in np.split(rows[s][span], breaks):
                 self.successive.setdefault(s, Successive()).add(stretch)
+        for a in self.angles:
+            self.lost += _skipped(np.abs(np.diff(rows[a][span])) / dt[start[0] : end[-1]])
         n = (end - start).astype(float)
         out: dict[str, Array] = {k: np.full(start.size, v) for k, v in zip(self.keys, key, strict=False)}
         suspect = np.cumsum(np.nan_to_num(rows["flag"]) != 0.0) if "flag" in rows else np.zeros(t.size)
@@ -222,6 +227,16 @@ class Averager:
                 out[s] = (total[end] - total[start]) / (count[end] - count[start])
         self.done.append(out)
 
+    def lost_sentence(self) -> str:
+        """Return that the angle goes on by more than a sample's, "" where it does not."""
+        if self.lost < MISSED:
+            return ""
+        return (
+            f"At {self.lost} places the table turns by two samples or more in the time of one: samples were lost, and "
+            "the times of the later ones closed up. Windows are too short, rates from angle and time too large. Log "
+            "the clock with each sample."
+        )
+
     def windows(self) -> dict[str, Array]:
         """Return all windows so far, columns as named above; empty where there are none."""
         return {n: np.concatenate([d[n] for d in self.done]) for n in self.done[0]} if self.done else {}
@@ -235,6 +250,15 @@ class Averager:
             f"Gaps in the time series: {self.gaps} ({self.incomplete} rows without a value left out); {self.dropped} "
             f"of {kept + self.dropped} windows hold a gap and were dropped."
         )
+
+
+def _skipped(rate: Array) -> int:
+    """Return how many rates of an angle (m,) from sample to sample are those of two samples or more; 0 of one that is
+    not even.
+    """
+    usual = float(np.median(rate)) if rate.size else 0.0
+    even = float(np.median(np.abs(rate - usual))) < EVEN * usual
+    return int(np.count_nonzero((rate > FARTHER * usual) & (rate < WRAPPED * usual))) if even else 0
 
 
 def average(blocks: Iterable[Block], averager: Averager) -> dict[str, Array]:

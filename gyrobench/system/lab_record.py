@@ -114,7 +114,7 @@ def read_record(
             system.set(name, values[name])  # says which options there are
     head = read_head(data)
     windows: dict[str, np.ndarray[Any, Any]] = {}
-    series, notes, problems = is_time_series(head, columns), list[str](), list[str]()
+    series, notes, doubts, problems = is_time_series(head, columns), list[str](), list[str](), list[str]()
     known = (*system.options, *texts, *(OF_SERIES if series else ()))
     keys = Keys(known, phases=attitudes is not None or series, elsewhere=ELSEWHERE)
     stated = head.statements if series else read_statements(data)
@@ -143,7 +143,7 @@ def read_record(
     elif series:
         named = attitudes(system) if attitudes else None
         try:
-            windows, said, notes = windows_of_series(system, data, head, columns, said, named)
+            windows, said, notes, doubts = windows_of_series(system, data, head, columns, said, named)
         except DataError as error:
             problems += error.problems
             windows = {"phase": _phases_there(data, head)}
@@ -160,7 +160,7 @@ def read_record(
         windows.setdefault("flagged", np.zeros(count, dtype=np.int64))
     run = measured_run(system, plan, {n: said[n] for n in texts if n in said})
     run.window_units = {c.name: c.unit for c in columns if c.name in windows}
-    run.notes = notes
+    run.notes, run.doubts = notes, doubts
     return Record(windows, {}, run)
 
 

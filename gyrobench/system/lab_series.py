@@ -91,9 +91,9 @@ class _Names:
 def windows_of_series(
     system: System, file: Path, head: Head, columns: Sequence[CsvColumn], said: Mapping[str, str],
     attitudes: Mapping[str, str] | None,
-) -> tuple[dict[str, AnyArray], dict[str, str], list[str]]:  # fmt: skip
-    """Return the windows, the comments ``phase N`` (those found by the motion too), and warnings: what was left out,
-    samples that may be aliased, in coarse words or at the end of a range.
+) -> tuple[dict[str, AnyArray], dict[str, str], list[str], list[str]]:  # fmt: skip
+    """Return the windows, the comments ``phase N`` (those found by the motion too), warnings: what was left out,
+    samples that may be aliased; and what no verdict rests on: coarse words, the end of a range.
 
     attitudes: what a phase may be called.  Raises DataError.
     """
@@ -133,13 +133,14 @@ def windows_of_series(
     if problems:
         raise DataError(file, problems)
     units_of = {c.name: SHOWN.get(c.unit, c.unit) for c in names.columns}
-    notes = [averager.sentence()]
+    notes, doubts = [averager.sentence()], [averager.lost_sentence()]
     readings = [name for column, name in names.signals.items() if "mean" in column]
     for s in readings:
         seen = averager.successive[s]
         notes.append(sampling.warning(s, units_of[s], averager.step, seen, kind, bandwidth))
-        notes += [sampling.coarse(s, units_of[s], seen), sampling.ended(s, seen)]
-    return _as_windows(series, names, keys, columns), dict(said), [t for t in notes if t]
+        doubts += [sampling.coarse(s, units_of[s], seen), sampling.ended(s, seen)]
+    notes, doubts = ([t for t in texts if t] for texts in (notes, doubts))
+    return _as_windows(series, names, keys, columns), dict(said), notes, doubts
 
 
 def _as_windows(

@@ -25,7 +25,7 @@ from gyrobench.record.record import Record
 from gyrobench.system.lab_record import TEXTS, measured_run, set_options
 from gyrobench.system.system import System
 
-from . import norms, still
+from . import lost, norms, still
 from .channels import CHANNELS
 
 UP_DOWN = "up_down"  # option attitudes
@@ -71,7 +71,7 @@ def read_log(system: System, data: Path, values: Mapping[str, str]) -> Record:
     run.window_units = {f"mean_{c.name}": si[c.name] for c in CHANNELS} | {"t_start": "s", "t_end": "s"}
     channels = {"time": time, **{f"imu.rate[{k + 1}]": every[:, k] for k in range(3)}}
     run.units = {n: si["gx"] for n in channels if n != "time"}
-    run.notes = _coarse(time, every, windows, si)
+    run.doubts = _coarse(time, every, windows, si) + ([] if up_down else lost.doubts(time, every[:, :3]))
     return Record(windows, channels, run)
 
 

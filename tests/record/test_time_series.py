@@ -237,7 +237,23 @@ def test_words_and_ends_that_no_noise_averages_out(tmp_path: Path, word: float, 
     current = 0.7 + np.minimum(np.random.default_rng(1).normal(size=20_000), end)
     if word:
         current = word * np.rint(current / word)
-    read = fixed(tmp_path, [f"{0.1 * k:.1f},{i:.9g}" for k, i in enumerate(current)], more="# samples = means\n")
-    assert len(read.run.notes) == bool(said) and said in " ".join(read.run.notes)
+    more = "# samples = means\n# type_b = none\n# arrangement = checked\n"
+    read = fixed(tmp_path, [f"{0.1 * k:.1f},{i:.9g}" for k, i in enumerate(current)], more=more)
+    assert read.run.notes == [] and len(read.run.doubts) == bool(said) and said in " ".join(read.run.doubts)
+    verdict = load("fixed_position").reduce(read, {"ω_d": (None, 1e9)})["ω_d"].verdict
+    assert verdict == ("inconclusive" if said else "pass")
     off = np.mean(read.windows["mean"]) * 1e3 - 0.7
     assert (abs(off) > 5.0 / math.sqrt(20_000.0)) == bool(said)
+
+
+@pytest.mark.parametrize(("stated", "lost"), [("closed up", 7), ("as they were", 0)])
+def test_an_angle_that_goes_on_by_two_samples_is_named(tmp_path: Path, stated: str, lost: int) -> None:
+    """A table at 10 deg/s, 10 Hz, 0.001 deg of noise, turned from 359 deg to 0 three times; one row in 150 of 1160 is
+    missing, seven in all.  With their own times the rate shows nothing, and a window with a gap is left out."""
+    t = 0.1 * np.arange(1160)
+    keep = np.mod(np.arange(t.size) + 1, 150) != 0
+    angle = np.mod(10.0 * t[keep] + 1e-3 * np.random.default_rng(2).normal(size=int(keep.sum())), 360.0)
+    time = t[: angle.size] if stated == "closed up" else t[keep]
+    averager = time_series.Averager(["mean"], ["angle"], [], lambda _: time_series.Averaging(10.0))
+    time_series.average([{"time": time, "angle": angle, "mean": np.ones(angle.size)}], averager)
+    assert averager.lost == lost and ("samples were lost" in averager.lost_sentence()) == bool(lost)

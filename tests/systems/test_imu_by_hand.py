@@ -393,3 +393,14 @@ def test_readings_at_rest_change_the_turns_as_the_budget_says(tmp_path: Path) ->
     half = [turns.Turn(t.time, t.rate - (0.5e-5 if k in (3, 4) else 0.0) * np.eye(3)[1], t.before, t.after)
             for k, t in enumerate(at.found.turned)]  # fmt: skip
     assert turns.left(half, at.found.matrix) - clean == pytest.approx(1e-5 * rest[3 * 4 + 1], abs=1e-9)
+
+
+@pytest.mark.parametrize(("every", "said"), [(101, 1), (0, 0)])
+def test_samples_lost_with_the_times_closed_up_are_named(tmp_path: Path, every: int, said: int) -> None:
+    """One sample in 101 missing everywhere: each turn is read 1/101 too short, as a scale factor error of -9901 ppm is,
+    which put Sg 13 u off without a word."""
+    rng = np.random.default_rng(17)
+    time, gyro, acc = handled(Unit.drawn(rng, 0.01), poses(rng, 16), rng, gyro=GYRO, acc=ACC)
+    keep = np.mod(np.arange(time.size) + 1, every) != 0 if every else np.ones(time.size, dtype=bool)
+    run = record(write(tmp_path / "log.csv", time[: np.count_nonzero(keep)], gyro[keep], acc[keep])).run
+    assert len(run.doubts) == said and all("samples were lost" in text for text in run.doubts)

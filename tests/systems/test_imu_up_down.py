@@ -141,4 +141,4 @@ def test_words_that_the_noise_does_not_average_out_are_said(tmp_path: Path) -> N
     time, gyro, acc = up_down(np.random.default_rng(12), Unit.drawn(np.random.default_rng(11)))
     for word, said in ((1e-6, 0), (3e-6, 3)):
         run = record(write(tmp_path / f"{said}.csv", time, word * np.rint(gyro / word), acc)).run
-        assert sum("more than their noise averages out" in note for note in run.notes) == len(run.notes) == said
+        assert sum("more than their noise averages out" in text for text in run.doubts) == len(run.doubts) == said

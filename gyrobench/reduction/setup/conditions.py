@@ -79,6 +79,7 @@ def reasons(record: Record) -> list[Reason]:
     found = [Reason("part.external", text) for text in run.external]
     if run.measured:
         found += [Reason("record.note", text) for text in run.notes]
+        found += [Reason("record.samples", text, ("pass", "fail"), severity="doubt") for text in run.doubts]
         found += identical_phases(record) or identical_rows(record) or unsettled(record, readings(record.windows))
         found += at_the_end(record)
     if run.measured and not run.type_b_stated:
