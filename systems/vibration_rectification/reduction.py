@@ -29,7 +29,7 @@ from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.level_shift import jumped
 from gyrobench.reduction.estimation.nuisances import BOTH
-from gyrobench.reduction.estimation.unshown_columns import fading, intervals_with
+from gyrobench.reduction.estimation.unshown_columns import fading, heating, intervals_with
 from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all, doubts_at_rest, unanswered, word_error
 from gyrobench.reduction.setup.sources import GRAVITY, GYRO_WORD, LATITUDE
 from gyrobench.reduction.toolkit import (
@@ -189,22 +189,37 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
             )  # fmt: skip
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
-        """Add what the coefficients may be with effects that noise explains as well: a fourth power of the level, one
-        against gravity, and what fades after the axis was turned over, as heat that another attitude moves does.
+        """Add what the coefficients may be with effects that noise explains as well: other powers of the level, one
+        against gravity, heat of the vibration, and what fades after the axis was turned over, as heat that another
+        attitude moves does.
         """
         gyro = self.channel == GYRO
-        text = (
-            f"{'G2' if gyro else 'K2'} may hold a fourth power of the level, and its interval is wider "
-            "with it. Take more levels, or leave out the highest."
-        )
+        t0, t1 = (np.asarray(self.windows[n], dtype=float) for n in ("t_start", "t_end"))
+        square = "G2" if gyro else "K2"
+        wider = "and its interval is wider with it. Take more levels"
+        text = f"{square} may hold a fourth power of the level, {wider}, or leave out the highest."
         reasons = self._with(result, "level.fourth.with", text, self.s2[:, None] ** 2)
+        cause = "as a dead band that vibration overcomes does"
+        text = f"{square} may hold what grows with the level itself, {cause}, {wider}."
+        reasons += self._with(result, "level.linear.with", text, np.sqrt(self.s2)[:, None])
+        if "temperature" not in self.windows:
+            text = (
+                f"What the vibration heats, and what cools after it, is not told from a drift of the {self.channel}. "
+                "Record the temperature of the unit, or take the levels in another order once more."
+            )
+            reasons += self._with(result, "level.heat.with", text, heating(self.s2, t0, t1))
         if self.both:
             text = (
                 f"{'G' if gyro else 'S and K3'} may hold what changes with the level and with up and down, as readings "
                 "that are clipped at the ends of a range make it: intervals are wider with it. Take more levels, or "
                 "leave out the highest."
             )
-            reasons += self._with(result, "level.odd.with", text, self.odd) + self._faded(result)
+            reasons += self._with(result, "level.odd.with", text, self.odd)
+            text = (
+                "What fades after the axis was turned over, as heat that another attitude moves, is not told from a "
+                f"drift of the {self.channel}. Wait longer before the first reading of a position."
+            )
+            reasons += self._with(result, "turned.fades", text, fading(self.up, t0, t1))
         return replace(result, reasons=[*result.reasons, *reasons])
 
     @property
@@ -221,14 +236,6 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
         told = next((t.p for t in self.found.tests if f"{t.id}.with" == id), None)
         severity = "warning" if told is not None and told < SHOWN else "condition"
         return [Reason(id, text, BOTH, severity=severity, intervals=intervals)] if intervals else []
-
-    def _faded(self, result: DriftTestResult) -> list[Reason]:
-        t0, t1 = (np.asarray(self.windows[n], dtype=float) for n in ("t_start", "t_end"))
-        text = (
-            "What fades after the axis was turned over, as heat that another attitude moves, is not told from a drift "
-            f"of the {self.channel}. Wait longer before the first reading of a position."
-        )
-        return self._with(result, "turned.fades", text, fading(self.up, t0, t1))
 
     def late(self) -> Array:
         """Return the step of the mean square that a reading would still hold some of, a third of the one before it."""

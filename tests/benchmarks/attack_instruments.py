@@ -6,7 +6,7 @@ Records, instruments and sites are written in plain numpy (attack_records.py, at
 without the bench's parts; each fault is of a size by chance, from one noise of a reading to a hundred.  Of each fault
 are counted
 
-right    no estimate is off by more than 3 u, and nothing is said
+right    no estimate is off by more than 3 u (imu_thermal: 4 u), and nothing is said
 said     a warning, a doubt or a refusal, or an interval that a verdict must hold for too and that holds the truth
 silent   an estimate is off by more than 3 u, and nothing is said
 
@@ -33,7 +33,7 @@ from gyrobench.result import Result
 
 SERIOUS = ("error", "warning", "doubt")
 EVERYWHERE = ("noise.unbounded", "turned.once")  # of any short record; of any that is turned over once
-OFF = 3.0  # u
+OFF, MANY = 3.0, 4.0  # u; of one of 75 coefficients
 WRITERS: dict[str, tuple[str, Callable[[np.random.Generator, str], Written]]] = {
     "vibration": ("vibration_rectification", shaken),
     "one way": ("vibration_rectification", shaken_one_way),
@@ -78,9 +78,10 @@ def judged(system: str, w: Written, folder: str) -> tuple[str, str, float]:
     z = off.get(worst, 0.0)
     if said := [r.id for r in found.reasons if r.severity in SERIOUS and r.id not in EVERYWHERE]:
         return "said", said[0], z
-    if abs(z) <= OFF:
+    least = OFF if len(off) < 30 else MANY
+    if abs(z) <= least:
         return "right", "", z
-    for name in (n for n in off if abs(off[n]) > OFF):
+    for name in (n for n in off if abs(off[n]) > least):
         held = [r.id for r in found.reasons if name in r.intervals
                 and r.intervals[name][0] <= w.truth[name] <= r.intervals[name][1]]  # fmt: skip
         if not held:

@@ -121,6 +121,9 @@ def shaken(rng: Rng, fault: str, one_way: bool = False) -> Written:
     if fault == "gravity":
         head = head.replace(f"{gravity:.9g}m/s2", f"{gravity + 0.05:.9g}m/s2")
     truth = {"b_g": b, "G": G, "G2": G2, "b_a": ba * 1e6, "S": S * 1e6, "K2": K2 * 1e6, "K3": K3 * 1e6}
+    if fault == "heat seen":  # that of the mean temperature
+        truth["b_g"] += noise["g"] * np.mean(c[6] - 25.0)
+        truth["b_a"] += 1e6 * noise["a"] * np.mean(c[6] - 25.0)
     if fault in ("jump", "period", "turned jump"):
         del truth["b_g"], truth["b_a"]  # there is not one
     if one_way:

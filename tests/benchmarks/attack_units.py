@@ -140,7 +140,7 @@ def chamber(rng: Rng, fault: str) -> Written:
 
     blind = Unit(*(np.zeros(s) for s in (3, (3, 3), (3, 3), 3, (3, 3))))
     exact = world.windows(CYCLE * 6, blind)
-    noise = {"g": 3e-5 * chance(rng, 0.1, 3.0), "a": 5e-3 * chance(rng, 0.1, 3.0)}
+    noise = {"g": 3e-5 * chance(rng, 1.0, 10.0), "a": 5e-3 * chance(rng, 1.0, 10.0)}
     middle, felt = 0.5 * (t0 + t1), program
     if fault == "late":  # the thermometer is that of the chamber; the unit follows
         t = np.arange(t0[0] - 1.0, t_end + 5.0, 5.0)

@@ -306,6 +306,43 @@ def test_a_fourth_power_of_the_level_asks_a_verdict_to_hold_with_it() -> None:
     assert G2.estimate - 3.0 > 5.0 * G2.u
 
 
+def of(result: Any, name: str, id: str) -> tuple[float, float, float]:
+    """Return estimate less truth over u of b_g (4) or G2 (3), and the interval that a verdict must hold for too."""
+    c = next(x for x in result.coefficients if x.name == name)
+    low, high = next(r for r in result.reasons if r.id == id and name in r.intervals).intervals[name]
+    return (c.estimate - {"b_g": 4.0, "G2": 3.0}[name]) / c.u, low, high
+
+
+def test_a_term_linear_in_the_level_asks_a_verdict_to_hold_with_it() -> None:
+    """0.1 °/h/g beside 3 °/h/g²: the line of least squares of x in 1 and x² at 0, 1, 2, 3 has the slope 0.306, so
+    G2 is 0.03 °/h/g² too large, 6 u, and no test of the residuals contradicts.  Of levels without it the interval is
+    as wide as that with a fourth power."""
+    table = shaken()
+    more = [[*row[:4], row[4] + 0.1 * row[3], row[5]] for row in table]
+    for rows_, off in ((table, False), (more, True)):
+        result = reduced(rows_)
+        z, low, high = of(result, "G2", "level.linear.with")
+        assert (z > 5.0) == off and low < 3.0 < high and high - low < 0.1
+        assert not any(r.severity in ("error", "doubt") for r in result.reasons)
+
+
+def test_heat_of_the_vibration_asks_a_verdict_to_hold_with_it() -> None:
+    """0.2 °/h/g² (T' = (s² - T)/400 s, a sum of exact steps of 1 s): b_g was 9 u off as a drift of the noise."""
+    table, warm = shaken(), 0.0
+    hot = []
+    for row in table:
+        read = []
+        for _ in range(8):  # a reading of 6 s every 8 s
+            warm += (0.2 * row[3] ** 2 - warm) * -math.expm1(-1.0 / 400.0)
+            read.append(warm)
+        hot.append([*row[:4], row[4] + float(np.mean(read[:6])), row[5]])
+    for rows_, off in ((table, False), (hot, True)):
+        z, low, high = of(reduced(rows_), "b_g", "level.heat.with")
+        assert (z > 5.0) == off and low < 4.0 < high and high - low < 0.5
+    ids = {r.id for r in reduced(hot, temperature=np.linspace(293.0, 300.0, len(hot))).reasons}
+    assert "level.linear.with" in ids and "level.heat.with" not in ids
+
+
 def test_a_level_that_acts_against_gravity_asks_a_verdict_to_hold_with_it() -> None:
     """Clipping takes 0.15 µg/g⁴ towards zero, up and down: K3 was 15 u below 1 µg/g³.  A G that rises with the level,
     0.02 °/h/g³: G was 0.02 times the mean square of the levels, 3.5 g², too large.  With the column of it both hold.

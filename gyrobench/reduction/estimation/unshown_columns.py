@@ -15,6 +15,7 @@ from gyrobench.arrays import Array
 from gyrobench.result import Coefficient
 
 FADES = (2.5, 10.0)  # time constants in a position, of what fades after it was taken
+HEATS = (0.05, 0.3)  # of a record, in which what is heated warms and cools
 
 
 def fading(up: Array, t0: Array, t1: Array) -> Array:
@@ -27,6 +28,23 @@ def fading(up: Array, t0: Array, t1: Array) -> Array:
     since = ((t0 + t1) / 2.0 - t0[turns][place]) / whole[place]
     fades = np.where(place > 0, up, 0.0)[:, None] * np.exp(-since[:, None] * np.array(FADES))
     return np.column_stack([fades, t0 - t0.mean()])
+
+
+def heating(power: Array, t0: Array, t1: Array) -> Array:
+    """Return the columns (n, 2) of what warms by the power (n,) of the readings, which goes on between two of them that
+    are not apart, and cools without: means over the readings.
+    """
+    length, gap = t1 - t0, np.append(t0[1:] - t1[:-1], 0.0)
+    between = np.where(gap <= length, power, 0.0)
+    out = np.empty((power.size, len(HEATS)))
+    for k, tau in enumerate(share * float(t1[-1] - t0[0]) for share in HEATS):
+        warm = 0.0
+        for j, (p, L, q, pause) in enumerate(zip(power, length, between, gap, strict=True)):
+            left = -math.expm1(-L / tau)
+            out[j, k] = p + (warm - p) * left * tau / L
+            warm += (p - warm) * left
+            warm += (q - warm) * -math.expm1(-pause / tau)
+    return out
 
 
 def intervals_with(X: Array, y: Array, more: Array, found: Sequence[Coefficient]) -> dict[str, tuple[float, float]]:
