@@ -17,7 +17,7 @@ from gyrobench.reduction.setup.setups import SiteSetup
 from gyrobench.reduction.setup.sources import Source
 
 from .geometry import AXES, EXACT, Motion, SetUp
-from .sources import AXIS_AZIMUTH, AXIS_LEVEL, MOUNT, ZERO
+from .sources import AXIS_AZIMUTH, AXIS_LEVEL, HYSTERESIS, MOUNT, ZERO
 
 SMALL = 1e-5  # rad, step of the perturbations (they are linear to 1e-10)
 
@@ -79,6 +79,7 @@ class Kinematics:
             (AXIS_LEVEL, turned[1]),
             (AXIS_AZIMUTH, turned[2]),
             *((ZERO.of(axis=n), self._change(m.off(k, SMALL))) for k, n in enumerate(AXES)),
+            *((HYSTERESIS.of(axis=n), self._change(m.off(k, SMALL * m.way(k)))) for k, n in enumerate(AXES)),
             (sources.SQUARE, self._change(m, SetUp(squareness=SMALL))),
             *(
                 (sources.ANGLE_OF[often].of(axis=n), _parts([

@@ -120,7 +120,15 @@ class Motion:
         both[axis] = start, end
         return Motion(both[0], both[1], self.length)
 
-    def off(self, axis: int, error: float) -> Motion:
+    def way(self, axis: int) -> Array:
+        """Return 1 or -1 (n,) by the way that the axis was turned last, within the window or to it; 0: not yet."""
+        start, end = (self.outer, self.inner)[axis]
+        came, turned = np.append(0.0, start[1:] - end[:-1]), end - start
+        moved = np.where(np.abs(turned) > STILL, turned, np.where(np.abs(came) > STILL, came, 0.0))
+        last = np.maximum.accumulate(np.where(moved != 0.0, np.arange(moved.size), 0))
+        return np.asarray(np.sign(moved[last]))
+
+    def off(self, axis: int, error: float | Array) -> Motion:
         """Return the motion of a table whose axis stands by ``error`` (rad) further than it reads."""
         both = [self.outer, self.inner]
         both[axis] = both[axis][0] + error, both[axis][1] + error

@@ -115,7 +115,7 @@ class ImuPositions(TableTest):
             axis="standard uncertainty of the outer axis against level, and against east",
             mount="standard uncertainty of the case about each of its axes on the plate",
         )
-        | type_b(sources.ZERO, "gravity", sources.GYRO_SCALE)
+        | type_b(sources.ZERO, sources.HYSTERESIS, "gravity", sources.GYRO_SCALE)
     )  # fmt: skip
     noises = tuple(f"imu.{a}_{n}" for a in "xyz" for n in ("gyro", "gyro_bias", "acc", "acc_bias"))
     assumed = ("table.base", "imu.mount")

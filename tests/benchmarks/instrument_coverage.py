@@ -1,10 +1,11 @@
 """How often the 95 % intervals of the tests of rate gyros and inertial units contain the true value.
 
-    python tests/benchmarks/instrument_coverage.py TEST [--runs 300] [--seed 1] [--unstated]
+    python tests/benchmarks/instrument_coverage.py TEST [--runs 300] [--seed 1] [--unstated] [--population]
 
 Each run draws instrument, noise and errors of the set-up by the function of the test's name, runs the whole
 co-simulation on a shortened plan and reduces it.  --unstated: the errors of the set-up are simulated, but nobody states
-them.
+them.  --population: instruments without noise, to whose readings that of the population is added for which intervals
+are made (gyrobench.reduction.estimation.noise), of twenty records for each instrument; of the tests in READINGS.
 """
 
 from __future__ import annotations
@@ -13,15 +14,19 @@ import argparse
 import logging
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from held import Held, found, stated
+from imu_positions import correlated
 from scipy.spatial.transform import Rotation
 
 from gyrobench.engine.session import Session
 from gyrobench.frames import G0
+from gyrobench.record.record import Record
+from gyrobench.reduction.estimation.noise import sample_instrument
+from gyrobench.result import Coefficient
 
 DEG = math.pi / 180.0
 DPH = DEG / 3600.0
@@ -183,6 +188,34 @@ PARTS = {
 }
 
 
+#: readings of a test and the standard deviation of their noise, SI
+READINGS = {
+    "coning_test": {f"drift_{a}": 0.02 * DPH for a in "xyz"},
+    "sculling_test": {"acceleration": 1e-5 * G0},
+    "vibration_rectification": {"rate": 2.0 * DPH, **{f"force_{a}": 2e-5 * G0 for a in "xyz"}},
+}
+RECORDS = 20
+
+
+def of_population(session: Session, test: str, values: Drawn, seed: int) -> list[Sequence[Coefficient]]:
+    """Return the coefficients of the records of one instrument."""
+    known = {f"{slot}.{name}" for slot, b in session.assembly.bindings.items() for name in b.parameters}
+    record = session.run({**values, **{n: 0.0 for n in session.system.noises if n in known}}, seed=seed)
+    system = session.system.with_values({n: v for n, v in values.items() if "." not in n})
+    t0, t1 = (np.asarray(record.windows[n], dtype=float) for n in ("t_start", "t_end"))
+    rng, out = np.random.default_rng(seed), []
+    for _ in range(RECORDS):
+        windows = dict(record.windows)
+        for name, size in READINGS[test].items():
+            tau, share, _ = sample_instrument(rng, t0, t1)
+            one = float(correlated(np.zeros(1), np.array([float(np.median(t1 - t0))]), tau)[0, 0])
+            white = np.diag(np.median(t1 - t0) / (t1 - t0))
+            V = (1.0 - share) * white + share / one * correlated(t0, t1, tau)
+            windows[name] = windows[name] + size * np.linalg.cholesky(V) @ rng.normal(size=t0.size)
+        out.append(system.reduce(Record(windows, {}, record.run)).coefficients)
+    return out
+
+
 def named(test: str, name: str, axis: str) -> str:
     """Return the name under which a measure is counted."""
     if test == "gyro_dynamics":
@@ -196,6 +229,7 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--unstated", action="store_true")
+    parser.add_argument("--population", action="store_true")
     given = parser.parse_args()
     logging.getLogger("gyrobench").setLevel(logging.ERROR)  # a line for each simulated error
     rng = np.random.default_rng(given.seed)
@@ -203,9 +237,12 @@ def main() -> int:
     parts: tuple[str, ...] = PARTS.get(given.test, ())
     for k, own in enumerate([(p,) for p in parts] or [()]):
         with Session(given.test, dict(zip(["gyro"], own, strict=False))) as session:
-            for run in range(given.runs // max(1, len(parts))):
+            for run in range(given.runs // max(1, len(parts)) // (RECORDS if given.population else 1)):
                 values = stated(DRAWN[given.test](rng, *own), given.unstated)
-                for c in found(session, values, 100_000 * given.seed + 10_000 * k + run):
+                seed = 100_000 * given.seed + 10_000 * k + run
+                every = of_population(session, given.test, values, seed) if given.population else [
+                    found(session, values, seed)]  # fmt: skip
+                for c in (c for each in every for c in each):
                     held.count(named(given.test, c.name, values.get("axis", "-")), c)
     return int(held.show(18) > 0)
 
