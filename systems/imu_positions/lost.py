@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.sentences import plain
 
 TURNING = 0.1  # least slope, of the largest of the record, of samples that say how large J usually is
 LOST, SURE = 0.6, 8.0  # least J, of a slope and of its usual size
@@ -38,6 +39,6 @@ def doubts(time: Array, rate: Array) -> list[str]:
         return []
     return [
         f"The rate goes on by whole samples more at {len(times)} places while the case turned, the first at t = "
-        f"{times[0]:.6g} s: samples were lost, and the times of the later ones closed up. Turns are read too short, "
+        f"{plain(times[0], 6)} s: samples were lost, and the times of the later ones closed up. Turns are read too short, "
         "the scale factors of the gyros too small by as much. Log the clock of the unit, or every sample."
     ]
