@@ -39,6 +39,6 @@ def doubts(time: Array, rate: Array) -> list[str]:
         return []
     return [
         f"The rate goes on by whole samples more at {len(times)} places while the case turned, the first at t = "
-        f"{plain(times[0], 6)} s: samples were lost, and the times of the later ones closed up. Turns are read too short, "
-        "the scale factors of the gyros too small by as much. Log the clock of the unit, or every sample."
+        f"{plain(times[0], 6)} s: samples were lost, and the times of the later ones closed up. Turns are read too "
+        "short, the scale factors of the gyros too small by as much. Log the clock of the unit, or every sample."
     ]
