@@ -59,6 +59,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.path.parent != Path(__file__).parent)
 
 
+@pytest.fixture
+def chinese_font() -> None:
+    """Skips a test where no font of the machine has Chinese characters."""
+    from gyrobench.report import fonts
+
+    try:
+        fonts.fonts_for(["测"])
+    except fonts.MissingFontError:
+        pytest.skip("no font of this machine has Chinese characters")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def forks() -> Iterator[None]:
     """Runs fork, as those of a command do: the threads of a test process that are there before its tests hold no lock.

@@ -18,8 +18,9 @@ from gyrobench.campaign.execution.store import Campaign
 from gyrobench.campaign.site import site_folder
 from gyrobench.campaign.site.campaign_comparison_page import write_comparison
 from gyrobench.campaign.site.site_folder import SCRIPT, write_site
-from gyrobench.report import fonts
 from gyrobench.report.language import WORD, catalogue
+
+pytestmark = pytest.mark.usefixtures("chinese_font")
 
 HERE = Path(site_folder.__file__).parent
 #: of the campaigns that are looked at: their names, questions, instruments, reasons, and what is typed into the filter
@@ -28,14 +29,6 @@ OWN = (
 )
 OWN += "name<number|name>number|u.name.|z.name.|state=failed|row 7: 3 cells, expected 5|no progress in 60 s|"
 OWN += "rate [\\d.]+: too close to the pole; at most 75 deg|This record contradicts itself: exchanged mounts.|lot|sweep"
-
-
-@pytest.fixture(autouse=True)
-def needs_a_font() -> None:
-    try:
-        fonts.fonts_for(["测"])
-    except fonts.MissingFontError:
-        pytest.skip("no font of this machine has Chinese characters")
 
 
 def left(html: str) -> set[str]:

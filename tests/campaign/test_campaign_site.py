@@ -309,7 +309,7 @@ def test_characters_that_turn_the_direction_of_a_text_are_shown(tmp_path: Path) 
 
 def test_no_file_of_a_site_has_the_folders_of_the_machine(tmp_path: Path) -> None:
     """Measured files by their places in the folder that holds all of them, files of a definition by their names."""
-    machine = "/home/someone/Prüf stand/los"
+    machine = "/someone/Prüf stand/los"
     columns = {"data": [f"{machine}/{k % 2}/{k}.csv" for k in range(9)], "state": ["done"] * 8 + ["refused"]}
     columns["reason"] = [None] * 8 + [f"{machine}/0/8.csv: not usable"]
     columns["warnings"] = [[f"{machine}/{k % 2}/{k}.csv has an odd row."] for k in range(9)]

@@ -14,22 +14,16 @@ from other_results import with_coefficient
 from reading import pdf_text
 
 from gyrobench.bench import UsageError
-from gyrobench.report import compare, comparison_page, comparison_summary, fonts
+from gyrobench.report import compare, comparison_page, comparison_summary
 from gyrobench.report.language import WORD, Language, catalogue, system_folder
 from gyrobench.report.report_files import own_texts
 from gyrobench.report.result_json import Report
 from gyrobench.result import Result
 from gyrobench.workflow.run_comparison import compare_results
 
+pytestmark = pytest.mark.usefixtures("chinese_font")
+
 NOTHING = {"estimate": math.nan, "u": math.nan, "interval": (math.nan, math.nan)}
-
-
-@pytest.fixture(autouse=True)
-def needs_a_font() -> None:
-    try:
-        fonts.fonts_for(["测"])
-    except fonts.MissingFontError:
-        pytest.skip("no font of this machine has Chinese characters")
 
 
 def run(value: float, seed: int | None = None, purposes: dict[str, str] | None = None, **own: Any) -> Result:

@@ -24,6 +24,8 @@ from gyrobench.report.render import html, pdf
 from gyrobench.report.standard_names import NAMES, names_table
 from gyrobench.result import Reason
 
+pytestmark = pytest.mark.usefixtures("chinese_font")
+
 FILES = sorted(
     [
         *language.FOLDER.glob("*.toml"),
@@ -41,14 +43,6 @@ TEXTS = {
     "Record longer.": "延长记录。",
     "Use {v}.": "请用 {v}。",
 }
-
-
-@pytest.fixture(autouse=True)
-def needs_a_font() -> None:
-    try:
-        fonts.fonts_for(["测"])
-    except fonts.MissingFontError:
-        pytest.skip("no font of this machine has Chinese characters")
 
 
 def small(**more: object) -> Language:
