@@ -32,7 +32,7 @@ class StrapdownAttitude(Component):
         phi = first + second + 2/3 first x second                                   samples = 2 (Miller 1983)
         q  <- exp(-Earth rate T) q exp(phi),   T: time since the last update
         p  = q q_reference^-1,   error: rotation vector of p p_0^-1 along the mean axes of the case
-        drift: change of error over the step, by the step                                          [TEST-CONING]
+        drift: change of error over the step, by the step, + Earth rate x (rotation vector of p)    [TEST-CONING]
 
         dv = dvelocity                                                              samples = 1
         dv = first + second + 2/3 (phi_1 x second + first x phi_2)                  samples = 2 (Savage 1998b)
@@ -46,7 +46,7 @@ class StrapdownAttitude(Component):
     Source: Miller 1983; Savage 1998, 1998b; Bortz 1971.
     """
 
-    version = "1.1.0"
+    version = "1.2.0"
 
     step = Parameter(1e9, "s", "largest internal step: one for each communication step", above=0.0)
     face = Rotation("rows: axes x, y, z of the case in table axes")
@@ -66,7 +66,7 @@ class StrapdownAttitude(Component):
     p_0 = Discrete(UPRIGHT, "1", "that as the gate opened")
     counted = Discrete(0.0, "1", "1 while the error is counted")
     off = Discrete(NONE, "rad", "error of the attitude")
-    change = Discrete(NONE, "rad/s", "its change over the step, by the step")
+    change = Discrete(NONE, "rad/s", "its change over the step, by the step, but for what the Earth's rate turns")
     seen = Discrete(0.0, "1", "increments seen")
     first = Discrete(NONE, "rad", "first increment of two")
     first_velocity = Discrete(NONE, "m/s", "first velocity increment of two")
@@ -75,7 +75,7 @@ class StrapdownAttitude(Component):
     t_update = Discrete(0.0, "s", "time of the last update")
 
     error = Output("rad", "error of the attitude, mean axes of the case", shape=(3,))
-    drift = Output("rad/s", "its change over the step, by the step", shape=(3,))
+    drift = Output("rad/s", "its change over the step, by the step, but for what the Earth's rate turns", shape=(3,))
     acceleration = Output("m/s2", "velocity gained beyond f_local in the step, by the step, table axes", shape=(3,))
 
     def start(self) -> None:
@@ -147,7 +147,10 @@ class StrapdownAttitude(Component):
             grown = 2.0 * atan2(size, fabs(wrong[0])) / size
         grown = -grown if wrong[0] < 0.0 else grown
         self.off = self.face @ (grown * axis)
-        self.change = (vector(self.off) - before) / self.h
+        whole = 2.0 * vector([self.p[1], self.p[2], self.p[3]])
+        whole = -whole if self.p[0] < 0.0 else whole
+        turned_along = self.face @ cross(vector(self.omega_local), whole)
+        self.change = (vector(self.off) - before) / self.h + turned_along
 
     def outputs(self) -> None:
         self.error = self.off

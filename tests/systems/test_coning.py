@@ -124,6 +124,19 @@ def test_random_units_drift_as_the_closed_form_says(session: Session, seed: int)
             assert found[name].truth == pytest.approx(hand[k] / DPH, abs=2e-4 * abs(c) / DPH)
 
 
+def test_an_error_that_has_grown_turns_with_the_earth(session: Session) -> None:
+    """618 deg/h about the cone for 4 s in the mean, a tilt of the Earth's rate of 3e-3 rad: 0.04 deg/h across the cone,
+    7e-5 of the drift, that no closed form of the gyros has.
+    """
+    quiet = dict.fromkeys(load_system(NAME).noises, 0.0)
+    values = {**SHORT, "frequencies": "20", "coning": False, "half_angle": 0.014, "latitude": 0.0}
+    exact = {"imu.gyro_scale": [[0.0] * 3] * 3, "imu.gyro_bias": [0.0] * 3, "imu.g_sensitivity": [[0.0] * 3] * 3}
+    record = session.run({**values, **quiet, **exact})
+    found = {c.name: c.estimate for c in load_system(NAME).with_values(values).reduce(record).coefficients}
+    for a in "xy":
+        assert abs(found[f"d_{a}(20 Hz)"]) < 1.5e-5 * abs(found["d_z(20 Hz)"])
+
+
 def test_set_up_errors_are_predicted(session: Session) -> None:
     """A case turned by 1 arc minute about x, a table that twists by 0.2 deg/h: in the budget's table of shifts."""
     turn = Rotation.from_rotvec([1.0 / 60.0 * DEG, 0.0, 0.0]).as_matrix().T
