@@ -15,6 +15,11 @@ Faults, wild: a thousandth of samples off by 20 standard deviations; step: of on
 missing: a tenth of the samples; gaps: a tenth, of 100 on average; slow: a warm-up of 3 standard deviations, a fifteenth
 of the record long, and three cycles of one.  "slow" stated: records with either taken out.
 
+drawn: another truth for each record, of what laboratories' instruments show: white noise, as it is or through a
+low-pass or a mean; none to three processes, tau even in the logarithm from 8 samples to a quarter of the record, the
+spectrum at zero over the white one from 0.1 to 10,000, tau a factor of three apart; in one record of five each a walk,
+angle noise, flicker.
+
 Of a process that is found tau and sigma are those of the true one nearest in log tau, each counted once; "sigma
 together" is of all true ones within its interval of tau.
 agree: part of the records whose model agrees with them, so that something is stated; the rest is counted over those.
@@ -58,11 +63,48 @@ TRUTHS: dict[str, dict[str, Any]] = {
     "two means over 8, flicker": {"N": 1.0, "B": 0.15, "all": (np.convolve(np.ones(8), np.ones(8)) / 64.0, [1.0])},
     "mean of 2, rounded": {"N": 1.0, "mean": 2, "markov": [(0.125, 100.0), (0.042, 3000.0)], "rounded": 0.042},
 }
-
+DRAWN = "drawn"
 
 FINE = 8  # steps of an oscillator to a sample
 KINDS = ("wild", "step", "line", "missing", "gaps", "slow")
 MIXED, AMONG = "any", ["", *KINDS[:5]]
+
+
+def drawn(n: int, rng: np.random.Generator) -> dict[str, Any]:
+    """Return a truth for a record of n samples, whose white noise is more than the rest at some frequency."""
+    omega = math.pi * np.arange(1, n // 2 + 1) / (n // 2)
+    while True:
+        truth: dict[str, Any] = {"N": 1.0, "markov": []}
+        S = np.ones_like(omega)
+        kind, count = rng.integers(4), rng.integers(4)
+        if kind == 0:
+            truth["lag"] = 10.0 ** rng.uniform(-0.5, 0.7)
+            a = math.exp(-1.0 / truth["lag"])
+            S = (1.0 - a) ** 2 / (1.0 - 2.0 * a * np.cos(omega) + a * a)
+        elif kind == 1:
+            truth["mean"] = int(rng.integers(2, 9))
+            S = (np.sin(0.5 * truth["mean"] * omega) / np.sin(0.5 * omega) / truth["mean"]) ** 2
+        while len(truth["markov"]) < count:
+            tau = 8.0 * (n / 32.0) ** rng.random()
+            if all(abs(math.log(tau / t)) > math.log(3.0) for _, t in truth["markov"]):
+                truth["markov"].append((math.sqrt(10.0 ** rng.uniform(-1.0, 4.0) / (2.0 * tau)), tau))
+        # a walk meets the white noise at 1 to 30 cycles of the record
+        sizes = {"K": 2.0 * math.pi / n * 10.0 ** rng.uniform(0.0, 1.5), "Q": 10.0 ** rng.uniform(-1.0, 0.5),
+                 "B": 10.0 ** rng.uniform(-1.5, -0.3)}  # fmt: skip
+        truth |= {name: size for name, size in sizes.items() if rng.random() < 0.2}
+        rest = sum(2.0 * s * s * t / (1.0 + (omega * t) ** 2) for s, t in truth["markov"])
+        rest = rest + truth.get("B", 0.0) ** 2 / omega + (truth.get("K", 0.0) / omega) ** 2
+        if np.any(S > rest + (truth.get("Q", 0.0) * omega) ** 2):
+            return truth
+
+
+def flicker(n: int, rng: np.random.Generator) -> Array:
+    """Return means over a sample (n,) of noise of the spectrum 1/omega, from four times the record on."""
+    omega = math.pi * np.arange(1, 2 * n + 1) / (2 * n)
+    S = sum((np.sin(0.5 * omega) / (0.5 * omega + math.pi * k)) ** 2 / np.abs(omega + 2.0 * math.pi * k)
+            for k in range(-8, 9))  # fmt: skip
+    white = np.fft.rfft(rng.normal(size=4 * n))
+    return np.fft.irfft(np.concatenate([[0.0], white[1:] * np.sqrt(S)]))[:n]
 
 
 def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Generator) -> Array:
@@ -73,7 +115,9 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
         x = lfilter([1.0 - a], [1.0, -a], x)
     if count := truth.get("mean", 0):
         x = lfilter(np.full(count, 1.0 / count), [1.0], x)
-    if "B" in truth:  # by half a difference: spectrum B^2/(2 sin(omega/2))
+    if "B" in truth and "all" not in truth and "digital" not in truth:
+        x = x + np.concatenate([np.zeros(500), truth["B"] * flicker(n, rng)])
+    elif "B" in truth:  # by half a difference: spectrum B^2/(2 sin(omega/2))
         k = np.arange(1.0, 2.0 * n)
         half = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
         x = x + truth["B"] * fftconvolve(rng.normal(size=3 * n), half)[2 * n - 500 : 3 * n]
@@ -118,7 +162,7 @@ def simulated(n: int, truth: dict[str, Any], kinds: list[str], rng: np.random.Ge
 
 
 def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str = "") -> None:
-    for name, truth in TRUTHS.items():
+    for name, truth in (TRUTHS | {DRAWN: {}}).items():
         if only not in name:
             continue
         inside, stated, missed = defaultdict(list), defaultdict(list), []
@@ -129,6 +173,8 @@ def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str
                 n = round(lengths[0] * (lengths[1] / lengths[0]) ** np.random.default_rng([12, i]).random())
             if MIXED in kinds:
                 these = [k for k in [np.random.default_rng([13, i]).choice(AMONG)] if k]
+            if name == DRAWN:
+                truth = drawn(n, np.random.default_rng([14, i]))
             model = fit_noise(simulated(n, truth, these, np.random.default_rng([11, i, n])), 1.0, means=False)
             agreed.append(model.agrees)
             if not model.agrees:  # nothing is stated
@@ -141,6 +187,7 @@ def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str
                 if not inside[term][-1]:
                     missed.append(f"{term} {i} ({n} {' '.join(these)}: {e.low:.4g} to {e.high:.4g})")
                 stated[term].append(e.determined)
+                stated[f"{term} absent"].append(e.determined and not true)
             stated["filter"].append(bool(model.filter_words()))
             stated["slow"].append(bool(model.settling or model.swings))
             processes = [*truth.get("markov", []), *truth.get("behind", [])]

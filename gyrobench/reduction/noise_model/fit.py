@@ -54,6 +54,7 @@ Parts = list[tuple[NoiseTerm, Array]]
 WORTH = 0.01  # of the most probable model with a term: weight of one whose upper end counts
 LIKELY = 0.03  # part of the posterior of models of a kind, from which on an interval holds for them too
 PART = 0.25  # of the variance of several processes: one of them that counts as any
+SHOWN = 4.0  # of the likelihood ratio, what a term brings that the record shows: two standard deviations of its size
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 FAST = ("N", "Q")  # coefficients that a band too weak to be found counts as
 CHANGES = {LevelStep: 5, Settling: 1, Swing: 2}  # at most
@@ -241,7 +242,7 @@ def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Clo
     least = found.prior.others[CALLED[name]][0] + BARELY
     absent = 1.0 - float(weights.sum()) + float(weights[values < least].sum())
     own = figure(at.model, at.p[None])
-    if own is None or absent > ABSENT:  # below what any model of weight with the term allows
+    if own is None or absent > ABSENT or not _shown(figure, found):  # below what any model of weight with the term allows
         having = [(c, v) for c in clouds if (v := figure(c.model, c.p)) is not None]
         most = max(float(c.weight.sum()) for c, _ in having)
         ends = [quantile(v, c.weight, 0.975) for c, v in having if float(c.weight.sum()) > WORTH * most]
@@ -252,6 +253,15 @@ def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Clo
         ratio = math.exp(0.5 * float(beside[0] - own[0]))
         low, high = low * min(ratio, 1.0), high * max(ratio, 1.0)
     return Estimate(value, *about(value, low, high), True)
+
+
+def _shown(figure: Callable[[Model, Array], Array | None], found: ModelSearch) -> bool:
+    """Return whether models without a term fit worse: flicker alone is likelier than two processes that fit as well, as
+    one term is than two, but the record does not tell it from them.
+    """
+    values = [(figure(f.model, f.p) is not None, f.value) for f in found.seen.values()]
+    best = [min((v for has, v in values if has == kind), default=math.inf) for kind in (True, False)]
+    return best[0] < best[1] - SHOWN
 
 
 def about(value: float, low: float, high: float) -> tuple[float, float]:

@@ -8,6 +8,7 @@ frozen in them; what their parameters leave open is added to all draws alike.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -67,13 +68,13 @@ def sample(found: Fitted, data: Ordinates, prior: Prior, count: int, rng: np.ran
 
 
 def candidates(search: ModelSearch) -> list[Fitted]:
-    """Return the models worth drawing from, the best first, and the best ones that have each of Q, B and K."""
-    ranked = sorted(search.seen.values(), key=lambda f: -f.evidence)
+    """Return the models worth drawing from, the best first, and the best ones with and without each of Q, B and K."""
+    ranked = search.ranked
     out = [f for f in ranked if f.evidence > ranked[0].evidence - WINDOW][:MOST]
-    for term in (Q, B, K):
-        having = [f for f in ranked if term in f.model]
-        if having and having[0] not in out:
-            out.append(having[0])
+    for term, has in itertools.product((Q, B, K), (True, False)):
+        some = [f for f in ranked if (term in f.model) == has]
+        if some and some[0] not in out:
+            out.append(some[0])
     return out
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,8 +25,9 @@ N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", 
 BEHIND = ("first", "shape3")
 SIMPLE, SHAPES = ("none", "first", "second", "average", "average+first"), ("shape3", "shape6", "shape10")
 TWICE = tuple(f"bartlett{k}" for k in range(3, 17))  # of two samples: a cascade
-AFTER_FIRST = tuple(f"mean{k}+first" for k in range(2, 17))
-MOST_STARTS = 4  # of these, the likeliest as they are
+WHOLE = tuple(f"mean{k}" for k in range(2, 17))
+AFTER_FIRST = tuple(f"{mean}+first" for mean in WHOLE)
+MOST_STARTS = 8  # of these, the likeliest as they are
 #: starts of the parameters of a filter
 STARTS: dict[str, list[list[float]]] = {
     "none": [[]],
@@ -185,7 +187,7 @@ class ModelSearch:
             if name == base or (name == "none" and W in at.model):
                 continue
             least = [(W, np.array([self.prior.readout]))]  # shows in a stop band, and in zeros of the fourth order
-            others = rest + least if name in DIGITAL + TWICE + AFTER_FIRST and W not in at.model else rest
+            others = rest + least if name in DIGITAL + TWICE and W not in at.model else rest
             for end in ("", ALL) if self.may_pass_all(name) else ("",):
                 new = NoiseTerm("white", name + end)
                 for guess in STARTS.get(name, [[0.0] * (new.size - 1)]):
@@ -210,22 +212,45 @@ class ModelSearch:
         return at
 
     def try_digital(self) -> None:
-        """Try digital low-passes and means in place of the best filter where the spectrum falls; they stay if nearly as
-        good.  From an average of any width no step leads across the zeros to that of another one.
+        """Try digital low-passes, where the spectrum falls, and means in place of the best filter; they stay if nearly
+        as good.
         """
         before = dict(self.seen)
-        if not self.holds_back:
-            return
-        fits, means = ([(m, s) for m, starts in self.filters(self.best, names) for s in starts]
-                       for names in (DIGITAL + TWICE, AFTER_FIRST))  # fmt: skip
-        means.sort(key=lambda t: float(self.data.value(t[0], t[1][None])[0]))
-        for model, start in [*fits, *means[:MOST_STARTS]]:
+        fits = [(m, s) for m, starts in self.filters(self.best, DIGITAL + TWICE) for s in starts]
+        for model, start in (fits if self.holds_back else []) + self.means():
             self.fit(model, start)
-        if any(t.filter in DIGITAL + TWICE + AFTER_FIRST for t in self.best.model):
+        if any(t.filter in DIGITAL + TWICE + WHOLE + AFTER_FIRST for t in self.best.model):
             self.climb(self.best, SIMPLE + DIGITAL)
         else:
             near = self.best.evidence - NEARLY
             self.seen = {m: f for m, f in self.seen.items() if m in before or f.evidence > near}
+
+    def means(self) -> list[tuple[Model, Array]]:
+        """Return the likeliest means over whole numbers of samples beside the slow terms of the best model: from an
+        average of any width no step leads across the zeros to that of another one, and beside what fills the zeros the
+        noise behind a mean passes for a fast process, or a process for that noise.
+        """
+        level, parts = self.prior.level, split(self.best.model, self.best.p)
+        slow = [part for part in parts if part[0] not in (W, Q) and part[0].name != "white"]
+        rests = [slow]
+        if fast := next((part for part in slow if part[0] == GM), None):
+            rests.append([part for part in slow if part is not fast])
+        if (low_pass := parts[0])[0].filter.removesuffix(ALL) == "first":
+            size, tau = low_pass[1]
+            rests.append([*slow, (GM, np.array([size - math.log(2.0) - tau, max(tau, math.log(SHORTEST_TAU) + 0.1)]))])
+        more = [[], [(Q, np.log(level[-1:] / 4.0))], [(W, np.array([self.prior.readout]))]]
+        sizes = np.arange(math.log(level.min()), math.log(level.max()) + 0.5, 0.5)
+        tried = list[tuple[float, Model, Array]]()
+        for name, rest, one in itertools.product(WHOLE + AFTER_FIRST, rests, more):
+            new = NoiseTerm("white", name)
+            model, start = joined([(new, np.array([0.0, *STARTS["first"][0]])[: new.size]), *rest, *one])
+            starts = np.tile(start, (sizes.size, 1))
+            starts[:, 0] = sizes
+            value = self.data.value(model, starts)
+            i = int(np.argmin(value))
+            tried.append((float(value[i]), model, starts[i]))
+        tried.sort(key=lambda t: t[0])
+        return [(model, start) for _, model, start in tried[:MOST_STARTS]]
 
     def grow_filters(self) -> None:
         """Try slow terms beside a mean over whole samples or a digital low-pass that is nearly as likely as the best
