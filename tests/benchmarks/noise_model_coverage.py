@@ -94,7 +94,7 @@ def drawn(n: int, rng: np.random.Generator) -> dict[str, Any]:
         truth |= {name: size for name, size in sizes.items() if rng.random() < 0.2}
         rest = sum(2.0 * s * s * t / (1.0 + (omega * t) ** 2) for s, t in truth["markov"])
         rest = rest + truth.get("B", 0.0) ** 2 / omega + (truth.get("K", 0.0) / omega) ** 2
-        if np.any(S > rest + (truth.get("Q", 0.0) * omega) ** 2):
+        if np.any(rest + (truth.get("Q", 0.0) * omega) ** 2 < S):
             return truth
 
 

@@ -26,6 +26,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model import posterior
 from gyrobench.reduction.noise_model.agreement import DeviationAgreement
 from gyrobench.reduction.noise_model.choice import Judge, deviations_of, filter_probability
+from gyrobench.reduction.noise_model.filter_starts import GM
 from gyrobench.reduction.noise_model.gap_completion import completed_by
 from gyrobench.reduction.noise_model.maximum import Fitted, maximize
 from gyrobench.reduction.noise_model.noise_model import (
@@ -40,8 +41,8 @@ from gyrobench.reduction.noise_model.noise_model import (
 )
 from gyrobench.reduction.noise_model.one_curve import steep_fall, weak_start
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, size_of, spectrum, split
-from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, weighted
-from gyrobench.reduction.noise_model.search import GM, ModelSearch, search, search_again
+from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, shown, weighted
+from gyrobench.reduction.noise_model.search import ModelSearch, search, search_again
 from gyrobench.reduction.noise_model.sensor_filters import DIGITAL, MEANS, Grid
 from gyrobench.reduction.noise_model.slow_changes import LevelChange, Settling, Swing, settling, swing
 from gyrobench.reduction.noise_model.steps import EDGE, LevelStep, largest_step, step_ratios
@@ -54,7 +55,6 @@ Parts = list[tuple[NoiseTerm, Array]]
 WORTH = 0.01  # of the most probable model with a term: weight of one whose upper end counts
 LIKELY = 0.03  # part of the posterior of models of a kind, from which on an interval holds for them too
 PART = 0.25  # of the variance of several processes: one of them that counts as any
-SHOWN = 4.0  # of the likelihood ratio, what a term brings that the record shows: two standard deviations of its size
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 FAST = ("N", "Q")  # coefficients that a band too weak to be found counts as
 CHANGES = {LevelStep: 5, Settling: 1, Swing: 2}  # at most
@@ -242,7 +242,8 @@ def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Clo
     least = found.prior.others[CALLED[name]][0] + BARELY
     absent = 1.0 - float(weights.sum()) + float(weights[values < least].sum())
     own = figure(at.model, at.p[None])
-    if own is None or absent > ABSENT or not _shown(figure, found):  # below what any model of weight with the term allows
+    if own is None or absent > ABSENT or not shown(figure, found):
+        # below what any model of weight with the term allows
         having = [(c, v) for c in clouds if (v := figure(c.model, c.p)) is not None]
         most = max(float(c.weight.sum()) for c, _ in having)
         ends = [quantile(v, c.weight, 0.975) for c, v in having if float(c.weight.sum()) > WORTH * most]
@@ -253,15 +254,6 @@ def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Clo
         ratio = math.exp(0.5 * float(beside[0] - own[0]))
         low, high = low * min(ratio, 1.0), high * max(ratio, 1.0)
     return Estimate(value, *about(value, low, high), True)
-
-
-def _shown(figure: Callable[[Model, Array], Array | None], found: ModelSearch) -> bool:
-    """Return whether models without a term fit worse: flicker alone is likelier than two processes that fit as well, as
-    one term is than two, but the record does not tell it from them.
-    """
-    values = [(figure(f.model, f.p) is not None, f.value) for f in found.seen.values()]
-    best = [min((v for has, v in values if has == kind), default=math.inf) for kind in (True, False)]
-    return best[0] < best[1] - SHOWN
 
 
 def about(value: float, low: float, high: float) -> tuple[float, float]:

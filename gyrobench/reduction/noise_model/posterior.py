@@ -16,16 +16,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.filter_starts import B, K, Q
 from gyrobench.reduction.noise_model.maximum import WIDEST, Fitted
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, split
 from gyrobench.reduction.noise_model.prior import Prior
-from gyrobench.reduction.noise_model.search import B, K, ModelSearch, Q
+from gyrobench.reduction.noise_model.search import ModelSearch
 
 WINDOW = 6.0  # of the logarithm of the evidence: models below the best by more are left out
 MOST = 10  # models
 DRAWS = 1200  # in all
 FREEDOM = 6.0  # degrees of freedom of the t distribution
 SEED = 7041
+SHOWN = 4.0  # of the likelihood ratio, what a term brings that the record shows: two standard deviations of its size
 
 
 @dataclass(frozen=True)
@@ -150,3 +152,12 @@ def quantile(values: Array, weights: Array, share: float) -> float:
     reached = np.cumsum(weights[order])
     at = (reached - 0.5 * weights[order]) / reached[-1]
     return float(np.interp(share, at, values[order]))
+
+
+def shown(figure: Callable[[Model, Array], Array | None], found: ModelSearch) -> bool:
+    """Return whether models without a term fit worse: flicker alone is likelier than two processes that fit as well, as
+    one term is than two, but the record does not tell it from them.
+    """
+    values = [(figure(f.model, f.p) is not None, f.value) for f in found.seen.values()]
+    best = [min((v for has, v in values if has == kind), default=math.inf) for kind in (True, False)]
+    return best[0] < best[1] - SHOWN

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,33 +11,32 @@ import numpy as np
 from scipy import special
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.filter_starts import (
+    AFTER_FIRST,
+    BEHIND,
+    GM,
+    SHAPES,
+    SIMPLE,
+    STARTS,
+    TWICE,
+    WHOLE,
+    B,
+    K,
+    N,
+    Q,
+    W,
+    means_beside,
+    misnamed,
+)
 from gyrobench.reduction.noise_model.maximum import Fitted, maximize, nearly_whole
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, passed, split
-from gyrobench.reduction.noise_model.prior import LONGEST_MEAN, SHORTEST_TAU, Prior
+from gyrobench.reduction.noise_model.prior import SHORTEST_TAU, Prior
 from gyrobench.reduction.noise_model.sensor_filters import ALL, DIGITAL, MEANS, samples_of
 from gyrobench.reduction.noise_model.terms import PEAKS, SLOW, NoiseTerm
 
 MOST_MARKOV, MOST_RESONANCES = 3, 24
 NEARLY = 6.0  # of the logarithm of the evidence
 MOST_VAIN = 6  # places where none is found
-N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
-BEHIND = ("first", "shape3")
-SIMPLE, SHAPES = ("none", "first", "second", "average", "average+first"), ("shape3", "shape6", "shape10")
-TWICE = tuple(f"bartlett{k}" for k in range(3, 17))  # of two samples: a cascade
-WHOLE = tuple(f"mean{k}" for k in range(2, 17))
-AFTER_FIRST = tuple(f"{mean}+first" for mean in WHOLE)
-MOST_STARTS = 8  # of these, the likeliest as they are
-#: starts of the parameters of a filter
-STARTS: dict[str, list[list[float]]] = {
-    "none": [[]],
-    "first": [[math.log(0.5)], [math.log(5.0)]],
-    "second": [[0.0, -0.3], [-2.0, -0.3]],
-    "average": [[math.log(w)] for w in (1.5, 2.2, 4.3, 8.4, 16.5)],
-    "butterworth": [[math.log(t), math.log(2.0)] for t in (0.15, 0.6, 2.5)],
-    "recursive": [[0.0, -0.3], [-2.0, -0.3]],
-    "cascade": [[math.log(t), math.log(k)] for t, k in ((0.3, 2.0), (1.0, 3.0))],
-    "average+first": [[math.log(w), math.log(0.5)] for w in (2.2, 4.3, 8.4)],
-}
 HELD_BACK = 0.3  # of the spectrum, just below half the sampling rate: what a low-pass passes there at most
 COHERENT = 10.0  # samples: a band that keeps its phase for less may be what the broadband terms lack
 WIDTHS = (1, 2, 4, 8, 16, 32)  # bins that a resonance may span
@@ -66,21 +64,11 @@ class ModelSearch:
         """Fit a model from a start and keep the best of its fits."""
         model, start = canonical(model, start)
         found = maximize(self.data, self.prior, model, start)
-        if self.at_bound(found):
+        if misnamed(found, self.prior):
             found = replace(found, evidence=found.evidence - 100.0)
         if model not in self.seen or found.evidence > self.seen[model].evidence:
             self.seen[model] = found
         return self.seen[model]
-
-    def at_bound(self, found: Fitted) -> bool:
-        """Return whether a process is as fast as one may be: then it is the filter that lacks something; or a mean as
-        long as one may be: then it stands for slow noise.
-        """
-        least, most = math.log(SHORTEST_TAU) + 1e-3, math.log(LONGEST_MEAN) - 1e-3
-        return any(
-            (t == GM and q[1] < least) or (t.filter.startswith("average") and q[1] > most)
-            for t, q in split(found.model, found.p)
-        )
 
     @property
     def best(self) -> Fitted:
@@ -217,40 +205,13 @@ class ModelSearch:
         """
         before = dict(self.seen)
         fits = [(m, s) for m, starts in self.filters(self.best, DIGITAL + TWICE) for s in starts]
-        for model, start in (fits if self.holds_back else []) + self.means():
+        for model, start in (fits if self.holds_back else []) + means_beside(self.best, self.data, self.prior):
             self.fit(model, start)
         if any(t.filter in DIGITAL + TWICE + WHOLE + AFTER_FIRST for t in self.best.model):
             self.climb(self.best, SIMPLE + DIGITAL)
         else:
             near = self.best.evidence - NEARLY
             self.seen = {m: f for m, f in self.seen.items() if m in before or f.evidence > near}
-
-    def means(self) -> list[tuple[Model, Array]]:
-        """Return the likeliest means over whole numbers of samples beside the slow terms of the best model: from an
-        average of any width no step leads across the zeros to that of another one, and beside what fills the zeros the
-        noise behind a mean passes for a fast process, or a process for that noise.
-        """
-        level, parts = self.prior.level, split(self.best.model, self.best.p)
-        slow = [part for part in parts if part[0] not in (W, Q) and part[0].name != "white"]
-        rests = [slow]
-        if fast := next((part for part in slow if part[0] == GM), None):
-            rests.append([part for part in slow if part is not fast])
-        if (low_pass := parts[0])[0].filter.removesuffix(ALL) == "first":
-            size, tau = low_pass[1]
-            rests.append([*slow, (GM, np.array([size - math.log(2.0) - tau, max(tau, math.log(SHORTEST_TAU) + 0.1)]))])
-        more = [[], [(Q, np.log(level[-1:] / 4.0))], [(W, np.array([self.prior.readout]))]]
-        sizes = np.arange(math.log(level.min()), math.log(level.max()) + 0.5, 0.5)
-        tried = list[tuple[float, Model, Array]]()
-        for name, rest, one in itertools.product(WHOLE + AFTER_FIRST, rests, more):
-            new = NoiseTerm("white", name)
-            model, start = joined([(new, np.array([0.0, *STARTS["first"][0]])[: new.size]), *rest, *one])
-            starts = np.tile(start, (sizes.size, 1))
-            starts[:, 0] = sizes
-            value = self.data.value(model, starts)
-            i = int(np.argmin(value))
-            tried.append((float(value[i]), model, starts[i]))
-        tried.sort(key=lambda t: t[0])
-        return [(model, start) for _, model, start in tried[:MOST_STARTS]]
 
     def grow_filters(self) -> None:
         """Try slow terms beside a mean over whole samples or a digital low-pass that is nearly as likely as the best
