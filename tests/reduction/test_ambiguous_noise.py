@@ -1,0 +1,63 @@
+"""Spectra that several models have, or nearly: which one is named, and what is not stated.  [DRIFT-NOISE-MODEL]"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.fit import fit_noise
+
+COVERAGE = Path(__file__).parents[1] / "benchmarks" / "noise_model_coverage.py"
+
+
+def process(n: int, sigma: float, tau: float, rng: np.random.Generator) -> Array:
+    """Return a Gauss-Markov process (n,)."""
+    a = math.exp(-1.0 / tau)
+    return np.asarray(lfilter([sigma * math.sqrt(1.0 - a * a)], [1.0, -a], rng.normal(size=n + 5000))[5000:])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_mean_whose_zeros_a_process_fills(seed: int) -> None:
+    """White noise behind a mean of eight samples and a process of 19: a low-pass of 16 samples stood for both, with N
+    of 5 instead of 1.
+    """
+    rng = np.random.default_rng([6, seed])
+    white = np.convolve(rng.normal(size=10_007), np.full(8, 0.125), "valid")
+    model = fit_noise(white + process(10_000, 0.898, 19.0, rng), 1.0, means=False)
+    assert model.filter_words() == "mean over 8 samples" and 0.9 < model["N"].value < 1.1
+    (found,) = model.processes
+    assert found.tau.determined and found.tau.low <= 19.0 <= found.tau.high
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_process_beside_white_noise_is_no_low_pass(seed: int) -> None:
+    """N = 1 and 5 over 15 samples: white noise of 27 (2 sigma^2 tau = 27^2) behind a low-pass of 15 samples and readout
+    noise of 1 have that spectrum too, and N was stated as 27.
+    """
+    rng = np.random.default_rng([7, seed])
+    model = fit_noise(rng.normal(size=15_000) + process(15_000, 5.0, 15.0, rng), 1.0, means=False)
+    assert model.filter_words() == "" and model["N"].low <= 1.0 and 0.8 < model["N"].value < 1.2
+    (found,) = model.processes
+    assert found.tau.low <= 15.0 <= found.tau.high and found.sigma.low <= 5.0 <= found.sigma.high
+
+
+@pytest.mark.parametrize("seed", [97, 100])
+def test_flicker_that_two_processes_may_be(seed: int) -> None:
+    """Processes of 46 and 829 samples; of 124 and 1,994 with less flicker: one term is likelier than two, which fit as
+    well.  B was stated as 0.13 to 0.19 (none is there) and 0.12 to 0.24 (0.036).
+    """
+    spec = importlib.util.spec_from_file_location("noise_model_coverage", COVERAGE)
+    assert spec is not None and spec.loader is not None
+    coverage = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(coverage)
+    truth = coverage.drawn(10_000, np.random.default_rng([14, seed]))
+    model = fit_noise(
+        coverage.simulated(10_000, truth, [], np.random.default_rng([11, seed, 10_000])), 1.0, means=False
+    )
+    assert not model["B"].determined and model["B"].low <= truth.get("B", 0.0) <= model["B"].high
