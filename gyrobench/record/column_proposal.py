@@ -25,6 +25,7 @@ from gyrobench.record.row_faults import NOTHING
 from gyrobench.record.text_cells import BINARY, cells_of_file, without_mark
 
 SAMPLE = 1 << 22  # bytes that are looked at
+IN_TURN = 20  # rows of another width that are no head of a file
 LONG = 2000  # rows from which on a file is taken for time series
 DAYS = ("%d.%m.%Y", "%Y-%m-%d", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y")
 CLOCKS = (
@@ -48,11 +49,15 @@ WORD = re.compile(r"[^\W\d_]{3,}")
 ENDINGS = {
     "dps": "dps", "mdps": "mdps", "degs": "deg/s", "deg_s": "deg/s", "rads": "rad/s", "rad_s": "rad/s", "degh": "deg/h",
     "deg_h": "deg/h", "g": "g", "mg": "mg", "ms2": "m/s2", "mps2": "m/s2", "m_s2": "m/s2",
-    "C": "degC", "c": "degC", "degC": "degC", "degc": "degC",
+    "C": "degC", "c": "degC", "celsius": "degC", "celcius": "degC", "degC": "degC", "degc": "degC",
     "s": "s", "sec": "s", "ms": "ms", "us": "us", "ns": "ns",
 }  # fmt: skip
 #: what messages of ROS and PX4 call a quantity -> unit of their definition
-MESSAGES = {r"(.*\.)?angular_velocity[._].*|gyro_rad": "rad/s", r"(.*\.)?linear_acceleration[._].*": "m/s2"}
+#: (MATLAB leaves out the points: fieldangular_velocityx), their covariances apart
+MESSAGES = {
+    r"(.*\.|field)?angular_velocity[._]?[xyz]\d*|gyro_rad": "rad/s",
+    r"(.*\.|field)?linear_acceleration[._]?[xyz]\d*": "m/s2",
+}
 EPOCH = (1e9, 4.1e9)  # s since 1970: 2001 and 2100
 NO_NAMES = "names = false  # no row of names: columns by their numbers"
 ENDING = re.compile(rf"(.*?[^_ .])[_ .]({'|'.join(sorted(ENDINGS, key=len, reverse=True))})")
@@ -149,7 +154,7 @@ def find_layout(file: Path) -> FileLayout:
     if begin.startswith(BINARY):
         raise UsageError(f"{file}: not a text file; save the table as CSV")
     encoding = find_encoding(begin)
-    best: tuple[float, str, int, list[list[str]]] | None = None
+    best: tuple[float, str, int, list[list[str]], list[int]] | None = None
     for delimiter in (";", "\t", ",", " "):
         lines = []
         for number, cells in cells_of_file(file, encoding, delimiter):
@@ -163,11 +168,16 @@ def find_layout(file: Path) -> FileLayout:
         score = sum(shares[k] for k in good) * (1.0 if width > 1 else 0.5)
         if good and (best is None or score > best[0] * 1.0001):
             start = _first_row(good, lines)
-            best = score, delimiter, start, lines
+            best = score, delimiter, start, lines, numeric
     if best is None:
         raise UsageError(f"{file}: no table of numbers with a row of names above it")
-    _, delimiter, start, lines = best
+    _, delimiter, start, lines, numeric = best
     width = len(lines[start])
+    others = [k for k in numeric if len(lines[k]) != width]
+    alike = [k for k in numeric if len(lines[k]) == width]
+    if 2 * len(others) > max(len(alike), IN_TURN):
+        shown = "; ".join(f"row {k + 1}: '{' '.join(lines[k])[:40]}'" for k in sorted((alike[0], others[0])))
+        raise UsageError(f"{file}: rows of two kinds in turn ({shown}): write what belongs together in one row")
     at, of_units = _rows_above(lines, start, width)
     names = without_mark(lines[at]) if at >= 0 else []
     if _share(names) > 0.0 or len(names) not in (width, width + 1):  # one more: a remark that no row has
@@ -192,10 +202,15 @@ def _first_row(good: Sequence[int], lines: Sequence[Sequence[str]]) -> int:
     like = [
         k for k in good if all(c in NOTHING or _share([c]) > 0.0 for c, u in zip(lines[k], usual, strict=True) if u)
     ]
-    start = next((k for a, k in enumerate(like) if like[a + 1 : a + 3] in ([], [k + 1], [k + 1, k + 2])), like[0])
+    filled = [k for k, cells in enumerate(lines) if any(cells)]  # rows may have an empty line between them
+    place = {k: a for a, k in enumerate(filled)}
+    after = [[place[j] - place[k] for j in like[a + 1 : a + 3]] for a, k in enumerate(like)]
+    start = next((k for k, steps in zip(like, after, strict=True) if steps in ([], [1], [1, 2])), like[0])
     first = usual.index(True)
-    while start and len(above := lines[start - 1]) == len(usual) and _share(above) >= 0.5 and _share([above[first]]):
-        start -= 1
+    for k in reversed(filled[: place[start]]):
+        if len(lines[k]) != len(usual) or _share(lines[k]) < 0.5 or not _share([lines[k][first]]):
+            break
+        start = k
     return start
 
 

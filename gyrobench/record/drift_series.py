@@ -34,6 +34,7 @@ from gyrobench.record.frozen import EqualSamples
 from gyrobench.record.range_ends import RangeEnds
 
 GAP = 1.5  # steps
+SAME = 0.3  # of the rows with the time of the row before: a clock that is too coarse
 CHUNK = 200  # samples whose median step is held against the usual one
 MIXED = 0.1  # of the step: a larger change of it is another sampling rate
 BEGINNING = 100_000  # values that are kept as they are
@@ -142,6 +143,12 @@ class DriftReader:
             k = int(back[0])
             others = f" ({back.size} rows in this part of the file)" if back.size > 1 else ""
             now = t[k + 1] if first else t[k]
+            if not d[back].any() and back.size > SAME * d.size and t[-1] > t[0]:
+                raise ValueError(
+                    f"row {after[k]}: time = {now:.9g} s, as in the row before{others}: the clock is coarser than the "
+                    "rows.  If the instrument samples evenly, leave the column time out (of the column map) and state "
+                    f"its rate: sampling = {(t.size - 1) / (t[-1] - t[0]):.3g}Hz by the rows of this part"
+                )
             raise ValueError(
                 f"row {after[k]}: time = {now:.9g} s does not come after {now - d[k]:.9g} s{others}; time must "
                 "increase: sort the rows, or reduce the parts as records of their own"

@@ -2,7 +2,9 @@
 
 A sample of independent noise equals the one before with a probability p0, the share of such pairs in the record; a run
 of L equal samples somewhere among n then has a probability below n p0^(L-1).  Readings that a low-pass or a coarse step
-make alike have a large p0 and long runs; what stands out of that is frozen.
+make alike have a large p0 and long runs; what stands out of that is frozen.  Samples that are not independent, as
+counts that come in lumps, go on being equal more often than p0: of the 100 longest other runs half are longer than the
+shortest by e or more, so that a run goes on with a probability of about 2^(-1/e).
 
 Rows that a logger wrote again, at regular places or by chance, are alike in every channel.  Of a single one the least
 difference q that is not 0 says how many would be alike by chance: q times the density of the differences at 0, of
@@ -12,6 +14,8 @@ channel less than a twentieth of the rows is not said.
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,6 +25,7 @@ import numpy as np
 from gyrobench.arrays import Array
 
 CHANCE = 1e-6  # of a run by the noise
+LONGEST = 100  # runs that tell how runs go on
 FEWEST = 20  # repeated rows that are said
 PART_OF_ONE = 0.05  # of the rows of a single channel
 MORE, MORE_OF_ONE = 10.0, 3.0  # times those by chance
@@ -37,6 +42,7 @@ class EqualSamples:
     equal: dict[str, int] = field(default_factory=dict)
     longest: dict[str, tuple[int, float]] = field(default_factory=dict)  # samples, time of the first, s
     running: dict[str, tuple[int, float]] = field(default_factory=dict)
+    lengths: dict[str, Counter[int]] = field(default_factory=dict)  # of the runs that have ended
     last: dict[str, float] = field(default_factory=dict)
     least: float = np.inf  # difference of the first channel that is not 0
     median: float = np.inf  # of the sizes of those, in the block where it is least
@@ -68,6 +74,10 @@ class EqualSamples:
         runs = [(before + first, since)] if before + first else []
         if begins.size:
             lengths = np.diff(np.append(begins, same.size))
+            ended = np.bincount(np.append(before + first, lengths[:-1]))
+            ended[0] = 0
+            many = np.flatnonzero(ended)
+            self.lengths.setdefault(name, Counter()).update(dict(zip(many.tolist(), ended[many].tolist(), strict=True)))
             k = int(np.argmax(lengths))
             runs.append((int(lengths[k]), float(time[begins[k]])))
             self.running[name] = (int(lengths[-1]), float(time[begins[-1]]))
@@ -83,9 +93,18 @@ class EqualSamples:
         for name, (length, when) in self.longest.items():
             others = max(self.samples - length, 1)
             p0 = min(max(self.equal[name] - length + 1, 0) / others + 1.0 / others, 1.0)
-            if self.samples * p0 ** (length - 1) < CHANCE:
+            if self.samples * p0 ** (length - 1) < CHANCE and self._stands_out(name, length):
                 out[name] = (length, when)
         return out
+
+    def _stands_out(self, name: str, length: int) -> bool:
+        """Return whether a run is longer than the long ones of its channel let expect."""
+        others = self.lengths.get(name, Counter()) - Counter([length])
+        counted = sorted(others.items())
+        ordered = np.repeat([n for n, _ in counted], [min(many, LONGEST + 1) for _, many in counted])[-LONGEST - 1 :]
+        if ordered.size <= LONGEST or not (half := float(np.median(ordered[1:] - ordered[0]))):
+            return True
+        return LONGEST * math.pow(0.5, (length - int(ordered[0])) / half) < CHANCE
 
     def rows_repeated(self) -> int:
         """Return the rows that repeat the one before in all channels, beyond what chance makes."""

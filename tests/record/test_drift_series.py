@@ -162,6 +162,8 @@ PAIRS = np.cumsum(np.where(np.arange(N) % 2 == 0, 0.01, 0.004))
     ("columns", "scale", "words"),
     [
         ({"time [s]": BACK, "rate [deg/h]": RATE}, "", "row 502: time = 4 s does not come after 4.99 s"),
+        ({"time [s]": np.floor(TIME * 20.0), "rate [deg/h]": RATE}, "", "as in the row before (800 rows"),
+        ({"time [s]": np.floor(TIME * 20.0), "rate [deg/h]": RATE}, "", "its rate: sampling = 5.02Hz"),
         ({"time [s]": TWO, "rate [deg/h]": RATE}, "", "the sampling changes from 0.01 s to 0.1 s at about row"),
         ({"time [s]": BURSTS, "rate [deg/h]": RATE}, "", "come in bursts, 0.002 s apart with a mean of 0.0"),
         ({"time [s]": PAIRS, "rate [deg/h]": RATE}, "", "not evenly spaced: steps from 0.004 to 0.01 s"),

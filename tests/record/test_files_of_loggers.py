@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from gyrobench import units
+from gyrobench.bench import UsageError
 from gyrobench.record.column_map import read_map, translate
 from gyrobench.record.column_proposal import find_layout
 from gyrobench.record.log_files import as_text, is_log
@@ -115,6 +117,52 @@ def test_heads_of_other_programs(kind: str, tmp_path: Path) -> None:
     found = find_layout(tmp_path / "log.txt")
     assert (found.skip, found.below, found.names) == layout and found.rows == 40
     assert [(c.sources[0], c.name, c.unit) for c in found.columns] == columns
+
+
+@pytest.mark.parametrize("between", ["\n\n", "\n  \n", "\r\r\n"])
+@pytest.mark.parametrize("head", ["", "time [s],rate [deg/s]"])
+def test_empty_lines_between_the_rows(between: str, head: str, tmp_path: Path) -> None:
+    """A logger that ends its rows twice: names are above the first row, and no row is lost."""
+    rows = [f"{k / 100:.2f},{k % 7}.5" for k in range(3000)]
+    (tmp_path / "log.csv").write_bytes(between.join([*([head] if head else []), *rows, ""]).encode())
+    text, _ = write_columns(tmp_path / "log.csv", "drift_record", None)
+    names = ('"time [s]"', '"rate [deg/s]"') if head else (1, 2)
+    columns = "".join(f'[columns.{n}]\nfrom = {s}\nunit = "{u}"\n'
+                      for n, s, u in zip(("time", "rate"), names, ("s", "deg/s"), strict=True))  # fmt: skip
+    (tmp_path / "map.toml").write_text(text.partition("[columns")[0] + columns, encoding="utf-8")
+    translate(tmp_path / "log.csv", read_map(tmp_path / "map.toml"), tmp_path / "out.csv")
+    found = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()
+    assert [line for line in found if line != "#"] == ["time [s],rate [deg/s]", *rows]
+
+
+def test_lines_of_two_kinds_in_turn(tmp_path: Path) -> None:
+    """A stamp above each sample: no column map has that; a few numbers above the table are a head of it."""
+    rows = [f"2018-03-24   22:19:{k // 5:02d}\n-{k % 7}.5   -0.{k % 3}  0.25\n" for k in range(100)]
+    (tmp_path / "log.txt").write_text("".join(rows), encoding="utf-8")
+    with pytest.raises(
+        UsageError, match=r"rows of two kinds in turn \(row 1: '2018-03-24 22:19:00'; row 2: '-0.5 -0.0 0"
+    ):
+        write_columns(tmp_path / "log.txt", "drift_record", None)
+    (tmp_path / "log.txt").write_text(
+        "1\t2\n" * 9 + "".join(f"{k}\t{k % 7}.5\t1.5\n" for k in range(9)), encoding="utf-8"
+    )
+    assert find_layout(tmp_path / "log.txt").rows == 9
+
+
+def test_messages_of_ros_in_a_table(tmp_path: Path) -> None:
+    """Their covariances are no channels; MATLAB leaves the points of the names out."""
+    for of, names in (
+        ("{}.{}", "{}_covariance_{}"), ("field.{}.{}", "field.{}_covariance{}"),
+        ("field{}{}", "field{}_covariance{}"), ("field{}{}6", "field{}_covariance{}6"),
+    ):  # fmt: skip
+        head = ["time"]
+        for quantity in ("angular_velocity", "linear_acceleration"):
+            head += [of.format(quantity, a) for a in "xyz"] + [names.format(quantity, k) for k in range(9)]
+        rows = "".join(f"{STAMP + 10_000_000 * k}{',0.5' * 24}\n" for k in range(20))
+        (tmp_path / "log.csv").write_text(",".join(head) + "\n" + rows, encoding="utf-8")
+        text, problems = write_columns(tmp_path / "log.csv", "drift_record", None)
+        units = re.findall(r'^unit = "(.*)"', text, re.MULTILINE)
+        assert problems == [] and units == ["ns", *G, *A]
 
 
 def test_axes_of_a_phone(tmp_path: Path, command: Any) -> None:

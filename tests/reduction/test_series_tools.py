@@ -31,6 +31,9 @@ def test_step_of_a_converter_and_its_error() -> None:
         # the rounding, q/sqrt 12, is taken off where it is a white error
         assert not white or found.noise == pytest.approx(noise * q, rel=0.02)
     assert quantization.quantization(rng.normal(size=5000)).step == 0.0
+    # steps of 0.0096 in three decimals are 0.010 and 0.009 in turn, up to 0.038: their mean is told
+    x = np.round(np.round(np.linspace(0.0, 3.4, 5000) + 0.1 * rng.normal(size=5000)) * 0.0096, 3)
+    assert not (found := quantization.quantization(x)).white and found.step == pytest.approx(0.038 / 4.0, rel=1e-3)
     found = quantization.folded(5.0, 720.0)
     assert found.decibels == pytest.approx(39.5, abs=0.05) and found.longest == pytest.approx(0.56e-3, rel=0.01)
     assert quantization.folded(0.4 / 720.0, 720.0).ratio == pytest.approx(1.0)

@@ -215,6 +215,20 @@ def test_runs_of_equal_samples_over_blocks() -> None:
     assert found.rows_repeated() == 0
 
 
+@pytest.mark.parametrize("stopped", [0, 500])
+def test_counts_that_come_in_lumps_are_not_frozen(stopped: int) -> None:
+    """Quiet and busy in turn, 30 samples each on average, zeros with 0.97 and 0.2: p0 is 0.5, and a run of zeros goes
+    on far longer than independent samples let expect; one of 500 is longer than those yet."""
+    rng = np.random.default_rng(2)
+    quiet = np.cumsum(rng.random(40_000) < 1.0 / 30.0) % 2 == 0
+    x = np.where(rng.random(quiet.size) < np.where(quiet, 0.97, 0.2), 0.0, np.round(5.0 * rng.normal(size=quiet.size)))
+    x[7000 : 7000 + stopped] = 0.0
+    found = EqualSamples(["x"])
+    for k in range(0, x.size, 8000):
+        found.add(np.arange(k, k + 8000.0), {"x": x[k : k + 8000]})
+    assert found.longest["x"][0] > 60 and list(found.frozen()) == ["x"] * (stopped > 0)
+
+
 @pytest.mark.parametrize(("step", "again", "named"), [(1e-5, 0.1, True), (0.03, 0.1, True), (0.03, 0.0, False),
                                                       (0.3, 0.1, False), (1.0, 0.0, False)])  # fmt: skip
 def test_rows_repeated_by_chance_in_a_single_channel(step: float, again: float, named: bool) -> None:

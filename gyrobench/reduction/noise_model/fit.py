@@ -116,7 +116,7 @@ def fit_noise(
         shape=joined([*split(at.model, at.p), *found.resonances]),
         coefficients={name: times(e, scale.units[name]) for name, e in of.items()},
         processes=tuple(_process(i, at, clouds, scale) for i in range(at.model.count(GM))),
-        minimum=_minimum(at, clouds, ramp, treated.samples, scale),
+        minimum=_minimum(at, found, clouds, ramp, treated.samples, scale),
         treatment=treated,
         agreements=(whole.scaled(scale.size, tau0), clean.scaled(scale.size, tau0)),
         with_wild={n: v * scale.units[n] for n, v in _with_wild(treated, at, found, means).items()},
@@ -349,15 +349,22 @@ def _ramp(found: ModelSearch, clouds: Sequence[Cloud]) -> Estimate:
     return Estimate(value, min(ends), max(ends), min(ends) * max(ends) > 0.0)
 
 
-def _minimum(at: Fitted, clouds: Sequence[Cloud], ramp: Estimate, samples: int, scale: Scale) -> Minimum:
-    """Return the least deviation of the model without resonances, up to a quarter of the record.
+def _minimum(
+    at: Fitted, found: ModelSearch, clouds: Sequence[Cloud], ramp: Estimate, samples: int, scale: Scale
+) -> Minimum:
+    """Return the least deviation of the model without resonances, up to a quarter of the record, each draw with a ramp
+    of its own where one is determined: it may be the ramp that ends the fall.
 
     What a filter takes of the noise at short averaging times is no minimum: of a deviation that rises from one sample
     on, what follows its first summit counts.
     """
     m = np.unique(np.rint(np.geomspace(1.0, max(samples / 4.0, 2.0), AVERAGES)))
+    rows, chance = [], np.random.default_rng(0)
+    for model, p in resampled(clouds, SAMPLE):
+        mean, sd = found.data.ramp_of(model, p)
+        drawn = mean + sd * chance.normal(size=mean.size) if ramp.determined else np.zeros(mean.size)
+        rows.append(np.sqrt(allan(model, p, m, scale.means) + 0.5 * (drawn[:, None] * m) ** 2))
     slow = 0.5 * (ramp.value * m) ** 2 if ramp.determined else 0.0
-    rows = [np.sqrt(allan(model, p, m, scale.means) + slow) for model, p in resampled(clouds, SAMPLE)]
     own = np.sqrt(allan(at.model, at.p[None], m, scale.means)[0] + slow)
     summit = _summit(own)
     m, own, curves = m[summit:], own[summit:], np.concatenate(rows)[:, summit:]
