@@ -8,6 +8,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 
 from gyrobench import units
@@ -17,6 +18,7 @@ from gyrobench.record.circumstances import statement, values_of
 from gyrobench.record.column_proposal import (
     CALLED,
     LONG,
+    NUMBER,
     FileColumn,
     FileLayout,
     find_layout,
@@ -163,10 +165,11 @@ def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[st
     temperatures under their own names, those without a unit by what they are called."""
     found: dict[str, FileColumn] = {}
     wanted = []
-    first, *others = layout.columns
     times = [c for c in layout.columns if _timed(c)]
-    if not times and first.rises and others and first.name.endswith("_1"):  # a matrix has no names
-        times = [first]
+    words = len([*takewhile(lambda c: c.shown and not NUMBER.match(c.shown), layout.columns)])  # "gyro" in every row
+    if not times and words + 1 < len(layout.columns):
+        first = layout.columns[words]
+        times = [first] if first.rises and first.name.endswith(f"_{words + 1}") else []  # a matrix has no names
     for c in layout.columns:
         name = re.sub(r"\W+", "_", c.name).strip("_") or f"column_{len(found) + 1}"
         likely = next((u for pattern, u in LIKELY.items() if re.fullmatch(pattern, name, re.I)), "")

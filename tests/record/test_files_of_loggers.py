@@ -149,6 +149,16 @@ def test_lines_of_two_kinds_in_turn(tmp_path: Path) -> None:
     assert find_layout(tmp_path / "log.txt").rows == 9
 
 
+def test_a_word_before_the_time_of_rows_without_names(tmp_path: Path) -> None:
+    """The first column of numbers that rises is the time; one that rises behind another is not."""
+    rows = "".join(f"gyro {2061 + 11 * k} 0.{k % 7} {k} 1.5\n" for k in range(40))
+    (tmp_path / "log.txt").write_text(rows, encoding="utf-8")
+    text, problems = write_columns(tmp_path / "log.txt", "drift_record", None)
+    assert "[columns.time]\nfrom = 2\n" in text and problems[0].startswith("column 'time': its unit")
+    (tmp_path / "log.txt").write_text(re.sub(r"gyro \d+", "gyro 7", rows), encoding="utf-8")
+    assert "columns.time" not in write_columns(tmp_path / "log.txt", "drift_record", None)[0]
+
+
 def test_messages_of_ros_in_a_table(tmp_path: Path) -> None:
     """Their covariances are no channels; MATLAB leaves the points of the names out."""
     for of, names in (
