@@ -192,6 +192,7 @@ PARTS = {
 READINGS = {
     "coning_test": {f"drift_{a}": 0.02 * DPH for a in "xyz"},
     "sculling_test": {"acceleration": 1e-5 * G0},
+    "rate_table_test": {"mean": 0.05 * DEG},
     "vibration_rectification": {"rate": 2.0 * DPH, **{f"force_{a}": 2e-5 * G0 for a in "xyz"}},
 }
 RECORDS = 20

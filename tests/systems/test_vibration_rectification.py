@@ -193,13 +193,16 @@ def test_a_temperature_that_goes_by_the_level_is_named() -> None:
 def test_a_lean_by_itself_up_and_down_is_in_u() -> None:
     """1 mrad about each axis.  A level gyro sees 15.041 °/h times a turn about north or up, whatever the latitude, and
     12 °/h/g times gravity along two axes across: 15.04 and 17.0 m°/h in each way, mean and half difference of two ways
-    1/√2 of √(15.04² + 16.97²) = 16.03 m°/h.  Of the accelerometer √2 1e-6 in each way, 1 µg."""
+    1/√2 of √(15.04² + 16.97²) = 16.03 m°/h.  The accelerometer lacks c = (x² + y²)/2 in each way, of mean and standard
+    deviation 1e-6: both ways the mean has mean square 1 + 1/2, the half difference 0 + 1/2; one way alone 1 + 1."""
     for latitude in (0.2, 1.1):
         one = {"u_lean": 1e-3, "latitude": latitude}
         u = {c.name: c.u for c in reduced(rows(0.0), one).coefficients}
         assert u["b_g"] == pytest.approx(16.03e-3, rel=1e-3) and u["G"] == pytest.approx(16.03e-3, rel=1e-3)
-        assert u["b_a"] == pytest.approx(1.0, rel=1e-3) and u["S"] == pytest.approx(1.0, rel=1e-3)
+        assert u["b_a"] == pytest.approx(math.sqrt(0.5), rel=1e-3) and u["S"] == pytest.approx(math.sqrt(1.5), rel=1e-3)
         assert u["G2"] < 1e-9 and u["K2"] < 1e-6
+        u = {c.name: c.u for c in reduced(rows(0.0, (1.0,)), one).coefficients}
+        assert u["b_a"] == pytest.approx(math.sqrt(2.0), rel=1e-3)
 
 
 def test_gyro_or_accelerometer_alone_and_one_way() -> None:
