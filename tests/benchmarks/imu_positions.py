@@ -4,15 +4,15 @@
 
 The records are made in plain numpy and scipy (tests/support/imu_world.py), which shares nothing with the reduction.
 
-table    12 positions and turns about three axes; noise of window means white, Gauss-Markov (correlation time from 0.3
-         windows to half the record) or both
+table    12 positions and turns about three axes; noise of window means of the population for which intervals are made
+         (gyrobench.reduction.estimation.noise)
 set_up   the same on a table and in a mount that are off by what is stated, or is not (set_up_unstated)
 thermal  six positions and turns, six times, while the temperature goes 40 K up and down; the same noise, or white
          noise alone (thermal_white)
 unknown  24 attitudes by hand, 3 s each, the turns between them sampled at 100 Hz; noise of a small unit, white,
          Gauss-Markov (0.3 positions to half the record) or both
-up_down  an axis up and down, 120 s each at 20 Hz; the same noise of gyros and accelerometers; in half of the runs
-         each position leans by 2 mrad, which is stated
+up_down  an axis up and down, 120 s each at 20 Hz; noise of the population in pieces of 6 s; in half of the runs each
+         position leans by 2 mrad, which is stated
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "systems"))
 from imu_world import EARTH, EDGES, FACES, Unit, World, handled, own_axes, plan, poses
 
+from gyrobench.reduction.estimation.noise import sample_instrument
 from gyrobench.system.system import load_system
 
 room = type(load_system("imu_positions")).__module__
@@ -60,12 +61,11 @@ def correlated(t0: Any, t1: Any, tau: float) -> Any:
 
 
 def noise_of(rng: Rng, t0: Any, t1: Any, size: float, own: Any = slice(None)) -> Any:
-    """Noise (n,) of window means of standard deviation ``size`` for the usual window; own: those that the instrument's
-    record has, up to half of whose length the correlation time goes.
+    """Noise (n,) of the population of window means of standard deviation ``size`` for the usual window; own: those that
+    the instrument's record has.
     """
     length, usual = t1 - t0, float(np.median((t1 - t0)[own]))
-    share = float(rng.choice([0.0, 1.0, rng.uniform()]))
-    tau = math.exp(rng.uniform(math.log(0.3 * usual), math.log(0.5 * float(t1[own][-1] - t0[own][0]))))
+    tau, share, _ = sample_instrument(rng, t0[own], t1[own])
     one = float(correlated(np.zeros(1), np.array([usual]), tau)[0, 0])
     covariance = size**2 * ((1.0 - share) * np.diag(usual / length) + share / one * correlated(t0, t1, tau))
     return np.linalg.cholesky(covariance) @ rng.normal(size=t0.size)
@@ -88,17 +88,21 @@ def moving_in(phases: Any) -> Any:
 
 
 def series_of(rng: Rng, n: int, step: float, window: float, size: float) -> Any:
-    """Noise of three gyros (n, 3) whose means over ``window`` (s) have the standard deviation ``size``: shares of white
-    and of Gauss-Markov noise as in :func:`noise_of`.
+    """Noise of three gyros (n, 3) whose means over ``window`` (s) have the standard deviation ``size``: white,
+    Gauss-Markov or both.
     """
     share = float(rng.choice([0.0, 1.0, rng.uniform()]))
     tau = math.exp(rng.uniform(math.log(0.3 * window), math.log(0.5 * n * step)))
+    return size * _series(rng, n, step, window, tau, share)
+
+
+def _series(rng: Rng, n: int, step: float, window: float, tau: float, share: float) -> Any:
     own = float(correlated(np.zeros(1), np.array([window]), tau)[0, 0])
     decay = math.exp(-step / tau)
     shocks = rng.normal(size=(n, 3)) * math.sqrt(1.0 - decay**2)
     shocks[0] = rng.normal(size=3)
-    slow = lfilter([1.0], [1.0, -decay], shocks, axis=0) * size * math.sqrt(share / own)
-    return slow + rng.normal(size=(n, 3)) * size * math.sqrt((1.0 - share) * window / step)
+    slow = lfilter([1.0], [1.0, -decay], shocks, axis=0) * math.sqrt(share / own)
+    return slow + rng.normal(size=(n, 3)) * math.sqrt((1.0 - share) * window / step)
 
 
 def of_table(rng: Rng) -> tuple[Any, dict[str, float]]:
@@ -169,7 +173,9 @@ def of_hand(rng: Rng) -> tuple[Any, dict[str, float]]:
 def of_up_down(rng: Rng) -> tuple[Any, dict[str, float]]:
     unit, latitude, n = Unit.drawn(rng), rng.uniform(-1.2, 1.2), 2400
     unit.Sa = unit.Sa * np.eye(3)
-    t = np.concatenate([np.arange(n), np.arange(n) + n + 400]) / 20.0
+    rows = np.concatenate([np.arange(n), np.arange(n) + n + 400])
+    start = rows[::120] / 20.0  # of the pieces
+    t = rows / 20.0
     lean = LEAN * rng.integers(2)
     force, rate = [], []
     for sign in (1.0, -1.0):  # axes of the case in east, north, up: x upright but for a lean of its own
@@ -177,8 +183,11 @@ def of_up_down(rng: Rng) -> tuple[Any, dict[str, float]]:
         force.append(case.inv().apply([0.0, 0.0, 9.805]))
         rate.append(case.inv().apply(EARTH * np.array([0.0, math.cos(latitude), math.sin(latitude)])))
     f, w = (np.repeat(v, n, axis=0) for v in (force, rate))
-    gyro = w @ (np.eye(3) + unit.Sg).T + f @ unit.G.T / 9.80665 + unit.bg + series_of(rng, 2 * n, 0.05, 6.0, 0.2 * DPH)
-    acc = f @ (np.eye(3) + unit.Sa).T + unit.ba + series_of(rng, 2 * n, 0.05, 6.0, 4.5e-4)
+    of_gyro, of_acc = (
+        _series(rng, 2 * n + 400, 0.05, 6.0, *sample_instrument(rng, start, start + 6.0)[:2])[rows] for _ in range(2)
+    )
+    gyro = w @ (np.eye(3) + unit.Sg).T + f @ unit.G.T / 9.80665 + unit.bg + 0.2 * DPH * of_gyro
+    acc = f @ (np.eye(3) + unit.Sa).T + unit.ba + 4.5e-4 * of_acc
     head = f"# attitudes = up_down\n# latitude = {math.degrees(latitude):.12g}deg\n# gravity = 9.805m/s2\n"
     truth = unit.coefficients()
     earth = EARTH * math.sin(latitude)

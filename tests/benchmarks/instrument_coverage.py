@@ -19,13 +19,12 @@ from typing import Any
 
 import numpy as np
 from held import Held, found, stated
-from imu_positions import correlated
+from imu_positions import noise_of
 from scipy.spatial.transform import Rotation
 
 from gyrobench.engine.session import Session
 from gyrobench.frames import G0
 from gyrobench.record.record import Record
-from gyrobench.reduction.estimation.noise import sample_instrument
 from gyrobench.result import Coefficient
 
 DEG = math.pi / 180.0
@@ -208,11 +207,7 @@ def of_population(session: Session, test: str, values: Drawn, seed: int) -> list
     for _ in range(RECORDS):
         windows = dict(record.windows)
         for name, size in READINGS[test].items():
-            tau, share, _ = sample_instrument(rng, t0, t1)
-            one = float(correlated(np.zeros(1), np.array([float(np.median(t1 - t0))]), tau)[0, 0])
-            white = np.diag(np.median(t1 - t0) / (t1 - t0))
-            V = (1.0 - share) * white + share / one * correlated(t0, t1, tau)
-            windows[name] = windows[name] + size * np.linalg.cholesky(V) @ rng.normal(size=t0.size)
+            windows[name] = windows[name] + noise_of(rng, t0, t1, size)
         out.append(system.reduce(Record(windows, {}, record.run)).coefficients)
     return out
 

@@ -1,8 +1,9 @@
 """How often the 95 % intervals of turn-ons contain the true value, of records written straight from the equations.
 
-    python tests/benchmarks/turn_on_coverage.py [one] [two] [hardly] [turning] [signs] [--runs 300] [--seed 1]
+    python tests/benchmarks/turn_on_coverage.py [one] [two] [hardly] [turning] [signs] [--runs 300] [--population]
 
-y = w + b_day + b_on + sum A m(t, tau) + E w m(t, tau_E) + white noise, over 1 to 2 days of 3 to 5 turn-ons of 300 s in
+y = w + b_day + b_on + sum A m(t, tau) + E w m(t, tau_E) + noise, white or of the population for which intervals are
+made (gyrobench.reduction.estimation.noise), over 1 to 2 days of 3 to 5 turn-ons of 300 s in
 readings of 5 s; no part, no simulation.  one, two: exponentials of 1 to 5 deg/h, tau of 10 to 40 s and four times that;
 hardly: the second within +-0.5 deg/h; turning: two, the scale factor with a third, at a rate in both senses; signs:
 two of sizes of either sign.  Where one is found of two, A stands for their sum and tau for the time after which 1/e of
@@ -17,6 +18,7 @@ import sys
 
 import numpy as np
 from held import Held
+from imu_positions import noise_of
 
 from gyrobench.arrays import Array
 from systems.turn_on_repeatability.reduction import Reduction, TurnOnSetup
@@ -27,7 +29,7 @@ KINDS = ("one", "two", "hardly", "turning", "signs")
 LIMIT, READING, EACH = 0.3, 5.0, 60  # deg/h, s
 
 
-def written(rng: np.random.Generator, kind: str) -> tuple[dict[str, Array], dict[str, float]]:
+def written(rng: np.random.Generator, kind: str, population: bool = False) -> tuple[dict[str, Array], dict[str, float]]:
     """Return windows and truth, SI."""
     days, of_day, tau = int(rng.integers(1, 3)), int(rng.integers(3, 6)), rng.uniform(10.0, 40.0)
     second = {"one": 0.0, "two": rng.uniform(1.0, 5.0), "hardly": rng.uniform(-0.5, 0.5)}.get(kind, rng.uniform(1, 5))
@@ -43,8 +45,9 @@ def written(rng: np.random.Generator, kind: str) -> tuple[dict[str, Array], dict
     bias = on * rng.normal(size=n) + between * rng.normal(size=days)[np.arange(n) // of_day]
     rate = 0.02 / DPH * (1.0 - 2.0 * (turn % 2)) if kind == "turning" else np.zeros(since.size)
     curve = means(since, length, taus) @ size + E * rate * means(since, length, np.array([120.0]))[:, 0]
-    y = rate + bias[turn] + curve + white * rng.normal(size=since.size)
     start = 400.0 * turn + since - 0.5 * READING
+    noise = noise_of(rng, start, start + READING, 1.0) if population else rng.normal(size=since.size)
+    y = rate + bias[turn] + curve + white * noise
     windows = {"t_start": start, "t_end": start + READING, "turn_on": turn + 1, "day": turn // of_day + 1,
                "since": since, "mean": DPH * y}  # fmt: skip
     there = np.flatnonzero(size)
@@ -65,6 +68,7 @@ def main() -> int:
     parser.add_argument("kinds", nargs="*", metavar="|".join(KINDS), default=list(KINDS))
     parser.add_argument("--runs", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--population", action="store_true")
     given = parser.parse_args()
     bad = 0
     if unknown := set(given.kinds) - set(KINDS):
@@ -73,7 +77,7 @@ def main() -> int:
         rng = np.random.default_rng([given.seed, KINDS.index(kind)])
         held = Held()
         for _ in range(given.runs):
-            windows, truth = written(rng, kind)
+            windows, truth = written(rng, kind, given.population)
             for c in Reduction.reduce(windows, TurnOnSetup(limit=LIMIT * DPH, truth=truth)).coefficients:
                 held.count(f"{kind:<10}{c.name}", c)
         bad += held.show(18, wide=True)
