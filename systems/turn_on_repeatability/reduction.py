@@ -238,15 +238,14 @@ class Reduction(DriftReduction[TurnOnSetup]):
         return replace(result, coefficients=[*own, *([warm] if warm else []), *added], reasons=reasons)
 
     def _time(self, truth: float | None) -> Coefficient | None:
-        """Return the time until the bias is within the limit; its interval by the warm-ups that the record allows."""
-        q, longest = self.tau.size, self.longest
+        """Return the time until the bias is within the limit; its interval holds those of the draws and of the fit."""
+        q, e = self.tau.size, self.tau_E.size
         meaning = f"time until the bias is within {plain(self.setup.limit / DPH, 4)} °/h of that when warm"
         if not q:
             return None
         value = self.found.value
-        own = Warming(value[1 : 1 + 2 * q : 2], np.maximum(value[2 : 2 + 2 * q : 2], 1e-3)).time_until(
-            self.setup.limit, longest
-        )
+        warm = Warming(value[1 : 1 + 2 * q : 2], np.maximum(value[2 : 2 + 2 * q : 2], 1e-3))
+        own = warm.time_until(self.setup.limit, self.longest)
         if not asked.whole():
             return Coefficient("t_w", meaning, SECONDS, own, math.nan, NORMAL, (math.nan, math.nan))
         times = np.sort(self._of_each(lambda w, t: w.time_until(self.setup.limit, t), self.allowed))
@@ -254,7 +253,10 @@ class Reduction(DriftReduction[TurnOnSetup]):
         if self.endless or not math.isfinite(own):
             return Coefficient("t_w", meaning, SECONDS, math.nan, math.nan, NORMAL, (low, math.inf), truth=truth,
                                no_value="not reached within the record")  # fmt: skip
-        low, high = min(low, own), max(high, own)
+        J = np.zeros((1, self.found.est.beta.size))
+        J[0, self.columns + np.r_[:q, q + e : 2 * q + e]] = warm.slopes(own)
+        factor = math.exp(min(float(self.found.est.mixture.spread(J)[1][0]) / own, 20.0)) if own else 1.0
+        low, high = min(low, own / factor), max(high, own * factor)
         u = (high - low) / (2.0 * NORMAL)
         return Coefficient("t_w", meaning, SECONDS, own, u, NORMAL, (low, high), truth=truth)
 

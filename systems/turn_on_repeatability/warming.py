@@ -57,6 +57,12 @@ class Warming:
 
         return float(optimize.brentq(at, t[k], t[k + 1]))
 
+    def slopes(self, t: float) -> Array:
+        """Return the derivatives (2q,) of the time t at which it passes a limit, by sizes and by ln tau."""
+        left = np.exp(-t / self.tau)
+        rate = float(left @ (self.size / self.tau))
+        return np.concatenate([left, self.size * left * t / self.tau]) / rate
+
     def time_constant(self, longest: float) -> float:
         """Return the time after which 1/e of the beginning is left, for good: tau of one exponential, s."""
         return self.time_until(abs(float(np.sum(self.size))) / math.e, longest)

@@ -14,6 +14,7 @@ from commanding import Command
 from gyrobench.engine.session import Session
 from gyrobench.packaging import load_part
 from gyrobench.reduction.drift.late_temperature import following
+from gyrobench.reduction.estimation.window_means import process_covariance
 from gyrobench.reduction.toolkit import ReductionError
 from gyrobench.system.system import load_system
 from systems.turn_on_repeatability import components
@@ -124,6 +125,33 @@ def test_two_exponentials_of_like_size_taken_for_one() -> None:
             assert high < 4.0 * found["τ"].estimate
             held += [low <= truth["τ"] <= high, found["A"].interval[0] <= 4.0 <= found["A"].interval[1]]
     assert len(held) >= 8 and sum(held) >= len(held) - 1
+
+
+def test_a_time_until_it_is_warm_under_drift() -> None:
+    """4 exp(-t/11) in a Gauss-Markov process of 40 s and 0.3 deg/h: t_w = 11 ln(4/0.3) = 28.49 s.  Generalized least
+    squares under that noise, dt_w = (11/4) dA + 28.49 dln(tau), have u = 2.3 s.  An interval that also allows for more
+    exponentials and other noise reaches 1.96 u to either side and more, less what the noise found is smaller by; that
+    of the draws alone ended 0.3 u below the estimate.
+    """
+    rng, A, tau = np.random.default_rng(1), 4.0, 11.0
+    turn, since = np.repeat(np.arange(4), 60), np.tile(2.5 + 5.0 * np.arange(60), 4)
+    start = since - 2.5 + 400.0 * turn
+    V = 0.3**2 * process_covariance(start, start + 5.0, 40.0)
+    high, mean, low = means(since, np.full(240, 5.0), tau * np.exp([1e-3, 0.0, -1e-3])).T
+    X = np.column_stack([np.eye(4)[turn], mean, A * (high - low) / 2e-3])
+    t_w = tau * math.log(A / 0.3)
+    by = np.array([0.0] * 4 + [tau / A, t_w])
+    u = math.sqrt(by @ np.linalg.solve(X.T @ np.linalg.solve(V, X), by))
+    assert t_w == pytest.approx(28.49, abs=0.01) and u == pytest.approx(2.3, abs=0.05)
+    found = []
+    for _ in range(5):
+        y = A * mean + rng.normal(0.0, 0.3, 4)[turn] + np.linalg.cholesky(V) @ rng.normal(size=240)
+        windows = {"t_start": start, "t_end": start + 5.0, "turn_on": turn + 1, "since": since, "mean": DPH * y}
+        coefficients = Reduction.reduce(windows, TurnOnSetup(limit=0.3 * DPH)).coefficients
+        found += [c for c in coefficients if c.name == "t_w" and not c.no_value]
+    sides = [(c.estimate - c.interval[0], c.interval[1] - c.estimate) for c in found]
+    assert len(sides) >= 4 and np.min(sides) > 1.2 * u
+    assert sum(c.interval[0] <= t_w <= c.interval[1] for c in found) >= len(found) - 1
 
 
 def test_time_constants_are_found() -> None:
