@@ -53,7 +53,7 @@ from gyrobench.result import Reason
 from gyrobench.units import DPH
 
 from . import mistakes
-from .sources import CONTROL, LEAN, LEAN_ACROSS, LEAN_COSINE, LEAN_COSINE_APART
+from .sources import CONTROL, LEAN, LEAN_ACROSS, LEAN_COSINE
 
 GYRO, FORCE = "gyro", "accelerometer"
 COLUMN = {GYRO: "rate", FORCE: "force"}
@@ -147,10 +147,10 @@ class VibrationChannel(DriftReduction[VibrationSetup]):
         if self.channel == FORCE:
             more = self.columns(self.f + 1e-4 * self.up, self.s2) / 1e-4 - X / 1e-4
             out.append(GRAVITY.effect(s, found.error(-self.up, more)))
-            # each way lacks (x2 + y2)/2 of mean and standard deviation u2: rms of the mean and of half the difference
-            mean, half = (math.sqrt(v) * LEAN.size(s) ** 2 for v in ((1.5, 0.5) if self.both else (2.0, 0.0)))
-            out.append(LEAN_COSINE.effect(mean, -self.f))
-            return [*out, LEAN_COSINE_APART.effect(half, -self.f * self.up)] if self.both else out
+            # a way lacks (x2 + y2)/2 of the force: u2 in the mean, which both ways share, with standard deviation u2
+            shorter = np.array([*(-self.f * w for w in self.ways.values()), -self.f])
+            out.append(LEAN_COSINE.effect(LEAN.size(s) ** 2, shorter, parts=(*self.ways, "mean")))
+            return out
         north, up = s.earth_rate * math.cos(s.latitude), s.earth_rate * math.sin(s.latitude)
         if s.axis == "x":
             out.append(LATITUDE.effect(s, found.error(-self.up * north)))

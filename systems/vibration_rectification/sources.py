@@ -14,6 +14,3 @@ LEAN_ACROSS = Source(
     "g-sensitivity across taken as large as that along",
 )  # fmt: skip
 LEAN_COSINE = Source("fixture.cosine", "cosine of the axis against the vertical", "1", "u_lean", "second order")
-LEAN_COSINE_APART = Source(
-    "fixture.cosine.apart", "half of what that cosine is up less down", "1", "u_lean", "second order"
-)
