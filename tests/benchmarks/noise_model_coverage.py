@@ -20,6 +20,8 @@ low-pass or a mean; none to three processes, tau even in the logarithm from 8 sa
 spectrum at zero over the white one from 0.1 to 10,000, tau a factor of three apart; in one record of five each a walk,
 angle noise, flicker.
 
+K is of the walk and of processes slower than a tenth of the record together, which drift as one within it.
+
 Of a process that is found tau and sigma are those of the true one nearest in log tau, each counted once; "sigma
 together" is of all true ones within its interval of tau.
 agree: part of the records whose model agrees with them, so that something is stated; the rest is counted over those.
@@ -179,8 +181,10 @@ def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str
             agreed.append(model.agrees)
             if not model.agrees:  # nothing is stated
                 continue
+            drifts = [s * s * 2.0 / t for s, t in [*truth.get("markov", []), *truth.get("behind", [])] if t > 0.1 * n]
+            walk = math.sqrt(truth.get("K", 0.0) ** 2 + sum(drifts))
             for term in "NBKRQ":
-                e, true = model[term], truth.get(term, 0.0)
+                e, true = model[term], walk if term == "K" else truth.get(term, 0.0)
                 inside[term].append(e.low <= true <= e.high)
                 if e.determined:
                     inside[f"{term} stated"].append(inside[term][-1])

@@ -41,7 +41,7 @@ from gyrobench.reduction.noise_model.noise_model import (
 )
 from gyrobench.reduction.noise_model.one_curve import steep_fall, weak_start
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, size_of, spectrum, split
-from gyrobench.reduction.noise_model.posterior import Cloud, quantile, resampled, shown, weighted
+from gyrobench.reduction.noise_model.posterior import NONE, Cloud, density_of_walk, quantile, resampled, shown, weighted
 from gyrobench.reduction.noise_model.search import ModelSearch, search, search_again
 from gyrobench.reduction.noise_model.sensor_filters import DIGITAL, MEANS, Grid
 from gyrobench.reduction.noise_model.slow_changes import LevelChange, Settling, Swing, settling, swing
@@ -55,6 +55,7 @@ Parts = list[tuple[NoiseTerm, Array]]
 WORTH = 0.01  # of the most probable model with a term: weight of one whose upper end counts
 LIKELY = 0.03  # part of the posterior of models of a kind, from which on an interval holds for them too
 PART = 0.25  # of the variance of several processes: one of them that counts as any
+SLOWEST = math.log(10.0)  # logarithm of the record over tau of a process that drifts as a walk within it
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 FAST = ("N", "Q")  # coefficients that a band too weak to be found counts as
 CHANGES = {LevelStep: 5, Settling: 1, Swing: 2}  # at most
@@ -229,9 +230,14 @@ def _spectrum_of(n: int, parts: Parts, means: bool) -> Array:
 
 
 # ------------------------------------------------------------------ figures of the draws
+def _figure(name: str, found: ModelSearch) -> Callable[[Model, Array], Array | None]:
+    """Return the figure log variance of a coefficient."""
+    return density_of_walk(found.prior.longest - SLOWEST) if name == "K" else size_of(CALLED[name])
+
+
 def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Cloud]) -> Estimate:
     """Return a coefficient in units of the fit: value of the model that is reported, interval of all draws with it."""
-    figure = size_of(CALLED[name])
+    figure = _figure(name, found)
     values, weights = weighted(clouds, figure)
     if not values.size:
         v0 = found.prior.others[CALLED[name]][0]
@@ -242,7 +248,7 @@ def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Clo
     least = found.prior.others[CALLED[name]][0] + BARELY
     absent = 1.0 - float(weights.sum()) + float(weights[values < least].sum())
     own = figure(at.model, at.p[None])
-    if own is None or absent > ABSENT or not shown(figure, found):
+    if own is None or not own[0] > NONE or absent > ABSENT or not shown(figure, found):
         # below what any model of weight with the term allows
         having = [(c, v) for c in clouds if (v := figure(c.model, c.p)) is not None]
         most = max(float(c.weight.sum()) for c, _ in having)
@@ -392,8 +398,8 @@ def _with_wild(treated: Treated, at: Fitted, found: ModelSearch, means: bool) ->
     data.hold(found.resonances)
     again = maximize(data, found.prior, at.model, at.p)
     out = {}
-    for name, term in CALLED.items():
-        v = size_of(term)(again.model, again.p[None])
-        if v is not None:
+    for name in CALLED:
+        v = _figure(name, found)(again.model, again.p[None])
+        if v is not None and v[0] > NONE:
             out[name] = math.exp(0.5 * float(v[0]))
     return out

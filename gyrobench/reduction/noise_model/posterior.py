@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.noise_model.filter_starts import B, K, Q
+from gyrobench.reduction.noise_model.filter_starts import GM, B, K, Q
 from gyrobench.reduction.noise_model.maximum import WIDEST, Fitted
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, split
 from gyrobench.reduction.noise_model.prior import Prior
@@ -27,6 +27,7 @@ MOST = 10  # models
 DRAWS = 1200  # in all
 FREEDOM = 6.0  # degrees of freedom of the t distribution
 SEED = 7041
+NONE = -600.0  # logarithm of the size of a term that is not there
 SHOWN = 4.0  # of the likelihood ratio, what a term brings that the record shows: two standard deviations of its size
 
 
@@ -154,10 +155,26 @@ def quantile(values: Array, weights: Array, share: float) -> float:
     return float(np.interp(share, at, values[order]))
 
 
+def density_of_walk(slowest: float) -> Callable[[Model, Array], Array | None]:
+    """Return the figure log K^2: of the random walk and of Gauss-Markov processes whose log tau is above ``slowest``,
+    which drift within the record as a walk of 2 sigma^2/tau does; NONE of draws with neither.
+    """
+
+    def figure(model: Model, p: Array) -> Array | None:
+        parts = [q[..., 0] if t == K else np.where(q[..., 1] > slowest, q[..., 0] + math.log(2.0) - q[..., 1], NONE)
+                 for t, q in split(model, p) if t in (K, GM)]  # fmt: skip
+        return np.asarray(np.logaddexp.reduce(parts, axis=0)) if parts else None
+
+    return figure
+
+
 def shown(figure: Callable[[Model, Array], Array | None], found: ModelSearch) -> bool:
     """Return whether models without a term fit worse: flicker alone is likelier than two processes that fit as well, as
     one term is than two, but the record does not tell it from them.
     """
-    values = [(figure(f.model, f.p) is not None, f.value) for f in found.seen.values()]
-    best = [min((v for has, v in values if has == kind), default=math.inf) for kind in (True, False)]
-    return best[0] < best[1] - SHOWN
+    best = {True: math.inf, False: math.inf}  # least -2 log likelihood of models with the term and without
+    for f in found.seen.values():
+        v = figure(f.model, f.p)
+        has = v is not None and float(v) > NONE
+        best[has] = min(best[has], f.value)
+    return best[True] < best[False] - SHOWN
