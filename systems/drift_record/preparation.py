@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -189,10 +190,15 @@ def truth_of(record: Record) -> dict[str, float]:
 
     N of a rate gyro is the density that it shows, or its parameter; otherwise the noise of the current reading is part
     of N.  Samples of a filter above half their rate fold its noise down (:func:`folded`).  Pickoff noise is angle noise
-    that the loop shapes: with it Q has no stated truth.
+    that the loop shapes: with it Q has no stated truth, nor has K with Gauss-Markov drift, which it may be of too.
     """
+    p: dict[str, Any] = dict(record.run.parameters)
+    drifts = any(re.fullmatch(r"gyro\.markov(_[xy])?", n) and p[n] for n in p)
+    return {term: v for term, v in _given(record, p).items() if term != "K" or not drifts}
+
+
+def _given(record: Record, p: Mapping[str, Any]) -> dict[str, float]:
     run = record.run
-    p: dict[str, Any] = dict(run.parameters)
     if run.options.get("reading") == "force":
         out = {term: float(p[n]) for term, name in GIVEN_FORCE.items() if (n := f"accelerometers.{name}") in p}
         out |= {n: folded(p, "accelerometers") * v for n, v in out.items() if n == "N"}

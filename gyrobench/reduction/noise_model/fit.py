@@ -34,7 +34,6 @@ from gyrobench.reduction.noise_model.noise_model import (
     CALLED,
     Minimum,
     NoiseModel,
-    Process,
     Scale,
     scale_of,
     times,
@@ -42,6 +41,7 @@ from gyrobench.reduction.noise_model.noise_model import (
 from gyrobench.reduction.noise_model.one_curve import steep_fall, weak_start
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, size_of, spectrum, split
 from gyrobench.reduction.noise_model.posterior import NONE, Cloud, density_of_walk, quantile, resampled, shown, weighted
+from gyrobench.reduction.noise_model.processes import LIKELY, process
 from gyrobench.reduction.noise_model.search import ModelSearch, search, search_again
 from gyrobench.reduction.noise_model.sensor_filters import DIGITAL, MEANS, Grid
 from gyrobench.reduction.noise_model.slow_changes import LevelChange, Settling, Swing, settling, swing
@@ -53,8 +53,6 @@ from gyrobench.reduction.series.noise_coefficients import Estimate
 Parts = list[tuple[NoiseTerm, Array]]
 
 WORTH = 0.01  # of the most probable model with a term: weight of one whose upper end counts
-LIKELY = 0.03  # part of the posterior of models of a kind, from which on an interval holds for them too
-PART = 0.25  # of the variance of several processes: one of them that counts as any
 SLOWEST = math.log(10.0)  # logarithm of the record over tau of a process that drifts as a walk within it
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 FAST = ("N", "Q")  # coefficients that a band too weak to be found counts as
@@ -116,7 +114,7 @@ def fit_noise(
         scale=scale,
         shape=joined([*split(at.model, at.p), *found.resonances]),
         coefficients={name: times(e, scale.units[name]) for name, e in of.items()},
-        processes=tuple(_process(i, at, clouds, scale) for i in range(at.model.count(GM))),
+        processes=tuple(process(i, at, clouds, scale) for i in range(at.model.count(GM))),
         minimum=_minimum(at, found, clouds, ramp, treated.samples, scale),
         treatment=treated,
         agreements=(whole.scaled(scale.size, tau0), clean.scaled(scale.size, tau0)),
@@ -287,50 +285,6 @@ def _beside_any_drift(
             ends = [math.exp(0.5 * quantile(values, weights, q)) for q in (0.025, 0.975)]
             low, high = min(low, ends[0]), max(high, ends[1])
     return low, high
-
-
-def _process(i: int, at: Fitted, clouds: Sequence[Cloud], scale: Scale) -> Process:
-    """Return the i-th Gauss-Markov process of a model; intervals are of those that stand in its place in the draws, and
-    hold for every likely model.
-
-    Where fewer terms stand for more, the tau of one is between those of two: draws of that model alone reach neither.
-    """
-    own = np.array([q for t, q in split(at.model, at.p) if t == GM])
-    low = high = own[i]
-    for some in (clouds, *([c] for c in clouds)):
-        q, weight = _in_place_of(own[:, 1], i, some)
-        if float(weight.sum()) > LIKELY:
-            ends = [[quantile(x, weight, share) for x in q.T] for share in (0.025, 0.975)]
-            low, high = np.minimum(low, ends[0]), np.maximum(high, ends[1])
-    present = float(_in_place_of(own[:, 1], i, clouds)[1].sum())
-    ends = np.exp([0.5, 1.0] * np.array([own[i], low, high])).T.tolist()
-    sigma, tau = (Estimate(value, down, up, present > 1.0 - ABSENT) for value, down, up in ends)
-    return Process(times(sigma, scale.size), times(tau, scale.tau0), present)
-
-
-def _in_place_of(taus: Array, i: int, clouds: Sequence[Cloud]) -> tuple[Array, Array]:
-    """Return parameters (M, 2) and weights of the processes of the draws that stand in place of the i-th of log taus
-    (k,): of those of a draw that are nearer to it than to the others the nearest one, or, where their mean by variance
-    is nearer, each with PART of their variance, at equal shares of the weight of the draw.
-    """
-    parameters, weights = [np.empty((0, 2))], [np.empty(0)]
-    for c in clouds:
-        each = [q for t, q in split(c.model, c.p) if t == GM]
-        if not each:
-            continue
-        q = np.stack(each, axis=1)  # (M, g, 2)
-        off = np.abs(q[:, :, 1:] - taus)  # (M, g, k)
-        mine = np.argmin(off, axis=2) == i
-        distance = np.where(mine, off[:, :, i], np.inf)
-        nearest = np.min(distance, axis=1, keepdims=True)
-        variance = np.where(mine, np.exp(q[:, :, 0]), 1e-300)
-        part = variance / np.sum(variance, axis=1, keepdims=True)
-        mean = np.sum(part * q[:, :, 1], axis=1, keepdims=True)
-        counts = mine & np.where(np.abs(mean - taus[i]) < nearest, part > PART, distance == nearest)
-        weight = c.weight[:, None] * counts / np.maximum(np.sum(counts, axis=1, keepdims=True), 1)
-        parameters.append(q[counts])
-        weights.append(weight[counts])
-    return np.concatenate(parameters), np.concatenate(weights)
 
 
 def _ramp(found: ModelSearch, clouds: Sequence[Cloud]) -> Estimate:
