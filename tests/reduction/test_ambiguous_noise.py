@@ -61,3 +61,18 @@ def test_flicker_that_two_processes_may_be(seed: int) -> None:
         coverage.simulated(10_000, truth, [], np.random.default_rng([11, seed, 10_000])), 1.0, means=False
     )
     assert not model["B"].determined and model["B"].low <= truth.get("B", 0.0) <= model["B"].high
+
+
+@pytest.mark.parametrize("tau", [math.inf, 15_000.0])
+def test_a_process_slower_than_a_tenth_of_the_record_is_a_walk(tau: float) -> None:
+    """K = 0.063 of a walk that meets white noise of 1 at 300 cycles of the record, and sigma^2 = K^2 tau/2 over half of
+    it: no K was stated, as the record does not tell one from the other.
+    """
+    n, K, stated = 30_000, 0.063, 0
+    for seed in range(3):
+        rng = np.random.default_rng([5, seed])
+        drift = np.cumsum(K * rng.normal(size=n)) if math.isinf(tau) else process(n, K * math.sqrt(0.5 * tau), tau, rng)
+        found = fit_noise(rng.normal(size=n) + drift, 1.0, means=False)["K"]
+        assert found.low <= K <= found.high < 1.3 * K
+        stated += found.determined
+    assert stated

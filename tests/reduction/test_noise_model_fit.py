@@ -12,13 +12,14 @@ from scipy.signal import lfilter
 
 from gyrobench.reduction.noise_model import treatment
 from gyrobench.reduction.noise_model.agreement import compare, squares_of_spectrum, with_spectrum
-from gyrobench.reduction.noise_model.fit import _process, about, fit_noise
+from gyrobench.reduction.noise_model.fit import about, fit_noise
 from gyrobench.reduction.noise_model.gap_completion import complete
 from gyrobench.reduction.noise_model.maximum import Fitted, maximize
 from gyrobench.reduction.noise_model.noise_model import Scale
 from gyrobench.reduction.noise_model.ordinates import Ordinates, allan
 from gyrobench.reduction.noise_model.posterior import Cloud, beside_free_bands
 from gyrobench.reduction.noise_model.prior import Prior
+from gyrobench.reduction.noise_model.processes import process
 from gyrobench.reduction.noise_model.search import ModelSearch
 from gyrobench.reduction.noise_model.sensor_filters import Grid
 from gyrobench.reduction.noise_model.terms import NoiseTerm
@@ -62,7 +63,7 @@ def test_a_process_that_stands_for_two_has_the_interval_of_both() -> None:
     at, one = Fitted((white, gm), np.array([0.0, 0.0, 3.0]), np.eye(3), 0.0, 0.0), (0.0, 3.0)
 
     def ends(*clouds: Cloud) -> list[float]:
-        tau = _process(0, at, clouds, scale).tau
+        tau = process(0, at, clouds, scale).tau
         return [math.log(tau.low), math.log(tau.value), math.log(tau.high)]
 
     both = ends(cloud(0.75, one), cloud(0.25, (0.0, 2.0), (0.0, 5.0)))
