@@ -234,7 +234,7 @@ def steps_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
     said = ", ".join(f"{number(size, u)} {units.unit} at {number(t)} s" for t, size, u in sorted(sizes))
     return (
         f"The level steps by {said}: a step, which no noise of the rest makes, is taken out before the model; left in, "
-        "K and B take it for theirs. Find its cause."
+        "K, B and B_min take it for theirs. Find its cause."
     )
 
 
@@ -261,7 +261,7 @@ def swings_text(noise: NoiseModel, units: ChannelUnits) -> str:
     ]
     return (
         f"The level swings by {', '.join(said)}: few cycles, which no noise of the rest makes, are taken out before "
-        "the model; left in, K and B take them for theirs. Record the temperature beside the rate."
+        "the model; left in, K, B and B_min take them for theirs. Record the temperature beside the rate."
     )
 
 
