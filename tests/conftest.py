@@ -61,7 +61,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def chinese_font() -> None:
-    """Skips a test where no font of the machine has Chinese characters."""
+    """Skips a test where no font of the machine has Chinese characters; a package such as fonts-noto-cjk brings one."""
     from gyrobench.report import fonts
 
     try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -190,14 +189,20 @@ def truth_of(record: Record) -> dict[str, float]:
 
     N of a rate gyro is the density that it shows, or its parameter; otherwise the noise of the current reading is part
     of N.  Samples of a filter above half their rate fold its noise down (:func:`folded`).  Pickoff noise is angle noise
-    that the loop shapes: with it Q has no stated truth, nor has K with Gauss-Markov drift, which it may be of too.
+    that the loop shapes: with it Q has no stated truth.  K is of a Gauss-Markov process too that is slower than a tenth
+    of the record.
     """
     p: dict[str, Any] = dict(record.run.parameters)
-    drifts = any(re.fullmatch(r"gyro\.markov(_[xy])?", n) and p[n] for n in p)
-    return {term: v for term, v in _given(record, p).items() if term != "K" or not drifts}
+    out = _given(record, p)
+    for name in ("gyro.markov", "gyro.markov_x"):
+        sigma, tau = p.get(name, 0.0), p.get(f"{name}_tau", p.get("gyro.markov_tau", 0.0))
+        if sigma and "K" in out and tau > (record.windows["t_end"][-1] - record.windows["t_start"][0]) / 10.0:
+            out["K"] = math.hypot(out["K"], sigma * math.sqrt(2.0 / tau))
+    return out
 
 
 def _given(record: Record, p: Mapping[str, Any]) -> dict[str, float]:
+    """Return the coefficients as the parameters of a run have them."""
     run = record.run
     if run.options.get("reading") == "force":
         out = {term: float(p[n]) for term, name in GIVEN_FORCE.items() if (n := f"accelerometers.{name}") in p}

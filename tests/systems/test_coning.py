@@ -125,8 +125,8 @@ def test_random_units_drift_as_the_closed_form_says(session: Session, seed: int)
 
 
 def test_an_error_that_has_grown_turns_with_the_earth(session: Session) -> None:
-    """618 deg/h about the cone for 4 s in the mean, a tilt of the Earth's rate of 3e-3 rad: 0.04 deg/h across the cone,
-    7e-5 of the drift, that no closed form of the gyros has.
+    """618 deg/h about the cone are 3.0e-3 rad/s: each second of them tilts the Earth's rate, 15.04 deg/h, by so much:
+    0.045 deg/h across the cone, 7.3e-5 of the drift, that no closed form of the gyros has.
     """
     quiet = dict.fromkeys(load_system(NAME).noises, 0.0)
     values = {**SHORT, "frequencies": "20", "coning": False, "half_angle": 0.014, "latitude": 0.0}

@@ -22,6 +22,7 @@ from gyrobench.reduction.series.noise_coefficients_table import TERMS
 from gyrobench.result import Coefficient
 from gyrobench.system.system import load_system
 from gyrobench.workflow.gyro_values import write_gyro_values
+from systems.drift_record.preparation import truth_of
 
 Array = NDArray[np.float64]
 DPH = math.pi / 648000.0
@@ -162,3 +163,12 @@ def test_channels(tmp_path: Path) -> None:
     column.tables["model"] = []
     with pytest.raises(UsageError, match="no noise model describes the record"):
         written(tmp_path / "v.toml", (found, column))
+
+
+@pytest.mark.parametrize("tau, true", [(999.0, 3e-9), (1250.0, 5e-9)])
+def test_the_truth_of_k_has_processes_slower_than_a_tenth_of_the_record(tau: float, true: float) -> None:
+    """Of 10,000 s; sigma = 1e-7 of 1250 s: sigma sqrt(2/tau) = 4e-9, and 3, 4, 5."""
+    run = SimpleNamespace(parameters={"gyro.walk": 3e-9, "gyro.markov": 1e-7, "gyro.markov_tau": tau}, options={})
+    windows = {"t_start": np.array([0.0, 5000.0]), "t_end": np.array([5000.0, 10000.0])}
+    record: Any = SimpleNamespace(run=run, windows=windows, channels={})
+    assert truth_of(record)["K"] == pytest.approx(true)
