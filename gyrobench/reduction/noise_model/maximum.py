@@ -73,21 +73,18 @@ def maximize(data: Ordinates, prior: Prior, model: Model, start: Array) -> Fitte
 
 
 def volume(model: Model, information: Array) -> float:
-    """Return the logarithm of the volume of the posterior over the parameters of the terms; each of a filter or
-    a resonance costs PRICE.
+    """Return the logarithm of the volume of the posterior over the parameters of the terms, those of a filter or a
+    resonance given; each of these costs PRICE.
 
-    Their prior is known to nobody: how sharply the record shows their parameters is no argument against them.
+    Their prior is known to nobody: how sharply the record shows their parameters is no argument against them, nor is it
+    one for them that they leave a term beside them open.
     """
     filters = np.concatenate([(np.arange(t.size) * (t.name == "white") > 0) | (t.name in PEAKS) for t in model])
-    H = information + WIDEST * np.eye(filters.size)
-    logdet = float(np.linalg.slogdet(H)[1])
-    count = int(filters.sum())
-    if count:
-        logdet -= float(np.linalg.slogdet(H[np.ix_(filters, filters)])[1])
+    H = information[np.ix_(~filters, ~filters)] + WIDEST * np.eye(int(np.sum(~filters)))
     whole = sum(
         t.filter.startswith(tuple(MEANS)) for t in model
     )  # its number of samples was sought as that of any mean
-    return 0.5 * (filters.size - count) * math.log(2.0 * math.pi) - 0.5 * logdet - PRICE * (count + whole)
+    return 0.5 * len(H) * math.log(2.0 * math.pi) - 0.5 * float(np.linalg.slogdet(H)[1]) - PRICE * (filters.sum() + whole)
 
 
 def by_chance(model: Model, p: Array, information: Array) -> float:
