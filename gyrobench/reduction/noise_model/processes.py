@@ -14,7 +14,7 @@ from gyrobench.reduction.noise_model.ordinates import split
 from gyrobench.reduction.noise_model.posterior import Cloud, quantile
 from gyrobench.reduction.series.noise_coefficients import Estimate
 
-LIKELY = 0.03  # part of the posterior of models of a kind, from which on an interval holds for them too
+LIKELY = 0.1  # part of the posterior of models of a kind, from which on an interval holds for them too
 PART = 0.25  # of the variance of several processes: one of them that counts as any
 
 
