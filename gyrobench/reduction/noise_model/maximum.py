@@ -81,10 +81,9 @@ def volume(model: Model, information: Array) -> float:
     """
     filters = np.concatenate([(np.arange(t.size) * (t.name == "white") > 0) | (t.name in PEAKS) for t in model])
     H = information[np.ix_(~filters, ~filters)] + WIDEST * np.eye(int(np.sum(~filters)))
-    whole = sum(
-        t.filter.startswith(tuple(MEANS)) for t in model
-    )  # its number of samples was sought as that of any mean
-    return 0.5 * len(H) * math.log(2.0 * math.pi) - 0.5 * float(np.linalg.slogdet(H)[1]) - PRICE * (filters.sum() + whole)
+    # the number of samples of a mean was sought as that of any mean
+    priced = int(np.sum(filters)) + sum(t.filter.startswith(tuple(MEANS)) for t in model)
+    return 0.5 * len(H) * math.log(2.0 * math.pi) - 0.5 * float(np.linalg.slogdet(H)[1]) - PRICE * priced
 
 
 def by_chance(model: Model, p: Array, information: Array) -> float:
