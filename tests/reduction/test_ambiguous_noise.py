@@ -11,10 +11,13 @@ import pytest
 from scipy.signal import lfilter
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.noise_model.filter_starts import Q
+from gyrobench.reduction.noise_model.filter_starts import FIRST, GM, N, Q
 from gyrobench.reduction.noise_model.fit import fit_noise
 from gyrobench.reduction.noise_model.maximum import volume
+from gyrobench.reduction.noise_model.prior import Prior
+from gyrobench.reduction.noise_model.search import ModelSearch
 from gyrobench.reduction.noise_model.terms import NoiseTerm
+from gyrobench.reduction.noise_model.treatment import treat
 
 COVERAGE = Path(__file__).parents[1] / "benchmarks" / "noise_model_coverage.py"
 
@@ -100,3 +103,21 @@ def test_angle_noise_beside_white_noise_that_passed_no_filter(seed: int) -> None
     rng = np.random.default_rng(seed)
     model = fit_noise(rng.normal(size=30_000) + np.diff(0.5 * rng.normal(size=30_001)), 1.0, means=False)
     assert model["Q"].low <= 0.5 <= model["Q"].high and model.chances["filtered"] < 0.3
+
+
+def test_every_instrument_has_white_noise() -> None:
+    """Angle noise of 1 and a process of 0.1 over 12 samples, without white noise: N^2 = sigma^2 (1 + a)/(1 - a) = 0.24,
+    a = exp(-1/12), behind a low-pass of 12 samples has that spectrum, and is called that.  White noise is tried beside
+    the process, too.
+    """
+    rng = np.random.default_rng(4)
+    record = np.diff(rng.normal(size=20_001)) + process(20_000, 0.1, 12.0, rng)
+    data = treat(record, 0.0, False, False).ordinates(False)
+    search = ModelSearch(data, Prior(data))
+    without = search.fit((Q, GM), np.array([0.0, math.log(0.01), math.log(12.0)]))
+    steps = dict(search.neighbours(without))
+    low_pass = search.fit((Q, FIRST), steps[Q, FIRST][0])
+    assert low_pass.value == pytest.approx(without.value, abs=0.3)
+    assert math.exp(low_pass.p[0]) == pytest.approx(0.24, rel=0.3)
+    assert low_pass.evidence > without.evidence + 90.0
+    assert (Q, GM, N) in steps

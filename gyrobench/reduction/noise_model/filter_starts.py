@@ -10,11 +10,12 @@ import numpy as np
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.maximum import Fitted
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, joined, split
-from gyrobench.reduction.noise_model.prior import LONGEST_MEAN, SHORTEST_TAU, Prior
+from gyrobench.reduction.noise_model.prior import FILTERS, LONGEST_MEAN, SHORTEST_TAU, Prior
 from gyrobench.reduction.noise_model.sensor_filters import ALL
 from gyrobench.reduction.noise_model.terms import NoiseTerm
 
 N, W, Q, B, K, GM = (NoiseTerm(n) for n in ("white", "readout", "quantization", "flicker", "walk", "gauss_markov"))
+FIRST = NoiseTerm("white", "first")
 BEHIND = ("first", "shape3")
 SIMPLE, SHAPES = ("none", "first", "second", "average", "average+first"), ("shape3", "shape6", "shape10")
 TWICE = tuple(f"bartlett{k}" for k in range(3, 17))  # of two samples: a cascade
@@ -32,6 +33,7 @@ STARTS: dict[str, list[list[float]]] = {
     "cascade": [[math.log(t), math.log(k)] for t, k in ((0.3, 2.0), (1.0, 3.0))],
     "average+first": [[math.log(w), math.log(0.5)] for w in (2.2, 4.3, 8.4)],
 }
+SLOWEST_POLE = math.log(FILTERS["first"][0][1])
 EXPLAINED = 0.7  # of the logarithm of the variance of readout noise, by rounding
 NEARLY_FIRST = 1.6  # order of a low-pass below which it is as good as one of first order, damping above which
 
@@ -70,12 +72,15 @@ def misnamed(found: Fitted, prior: Prior) -> bool:
 
     A process as fast as one may be: the filter lacks something.  A mean as long as one may be stands for slow noise.
     White noise behind a slow low-pass of first order, beside readout noise that is no rounding, has the spectrum of a
-    process beside white noise, and is called that.
+    process beside white noise, and is called that.  Without white noise a process that a low-pass may be is white noise
+    behind that: its level at low frequencies is N.
     """
     parts = split(found.model, found.p)
     least, most = math.log(SHORTEST_TAU) + 1e-3, math.log(LONGEST_MEAN) - 1e-3
     if any((t == GM and q[1] < least) or (t.filter.startswith("average") and q[1] > most) for t, q in parts):
         return True
+    if all(t.name != "white" for t, _ in parts):
+        return any(t == GM and q[1] < SLOWEST_POLE for t, q in parts)
     readout = next((q[0] for t, q in parts if t == W), None)
     if readout is None or (prior.rounding is not None and abs(readout - prior.rounding) < EXPLAINED):
         return False

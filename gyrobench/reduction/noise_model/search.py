@@ -14,9 +14,11 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.filter_starts import (
     AFTER_FIRST,
     BEHIND,
+    FIRST,
     GM,
     SHAPES,
     SIMPLE,
+    SLOWEST_POLE,
     STARTS,
     TWICE,
     WHOLE,
@@ -121,7 +123,8 @@ class ModelSearch:
         parts = split(at.model, at.p)
         names = [t.name for t in at.model]
         filtered = any(t.filter != "none" for t in at.model)
-        for term in (Q, B, K, GM, *([W] if filtered else [])):
+        white = "white" in names
+        for term in (Q, B, K, GM, *([W] if filtered else []), *([] if white else [N])):
             if names.count(term.name) < (MOST_MARKOV if term == GM else 1):
                 yield (*at.model, term), [np.concatenate([at.p, s]) for s in self.starts(at, term)]
         for i, (term, q) in enumerate(parts):
@@ -134,6 +137,8 @@ class ModelSearch:
                 for other, size in ((K, q[0] + math.log(2.0) - q[1]), (B, q[0])):
                     if other.name not in names:
                         yield (*model, other), [np.append(less, size)]
+                if not white and q[1] < SLOWEST_POLE:
+                    yield (*model, FIRST), [np.append(less, [q[0] + math.log(2.0) + q[1], q[1]])]
             elif term in (B, K) and names.count(GM.name) < MOST_MARKOV:
                 tau = self.prior.longest - 2.0
                 slow = np.append(less, [q[0] + (tau - math.log(2.0)) * (term is K), tau])
