@@ -42,6 +42,7 @@ from gyrobench.reduction.noise_model.one_curve import steep_fall, weak_start
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, size_of, spectrum, split
 from gyrobench.reduction.noise_model.posterior import NONE, Cloud, density_of_walk, quantile, resampled, shown, weighted
 from gyrobench.reduction.noise_model.processes import LIKELY, process
+from gyrobench.reduction.noise_model.pulses import WIDTHS, Pulse, pulse
 from gyrobench.reduction.noise_model.search import ModelSearch, search, search_again
 from gyrobench.reduction.noise_model.sensor_filters import DIGITAL, MEANS, Grid
 from gyrobench.reduction.noise_model.slow_changes import LevelChange, Settling, Swing, settling, swing
@@ -56,9 +57,9 @@ WORTH = 0.01  # of the most probable model with a term: weight of one whose uppe
 SLOWEST = math.log(10.0)  # logarithm of the record over tau of a process that drifts as a walk within it
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 FAST = ("N", "Q")  # coefficients that a band too weak to be found counts as
-CHANGES = {LevelStep: 5, Settling: 1, Swing: 2}  # at most
-RATIO = 8.0  # of the likelihood ratio of a step, above 2 log n
-SLOW, SEEN = 24.0, 9.0  # of that of a slow change: some ten of them differ; before the models are fitted again
+CHANGES = {LevelStep: 5, Pulse: 5, Settling: 1, Swing: 2}  # at most
+RATIO = 8.0  # of the likelihood ratio of a step or a pulse, above 2 log n (widths)
+SLOW, SEEN = 24.0, 9.0  # of that of a slow change: some ten of them differ; and before the models are fitted again
 LEAK = 10.0  # ordinates of mean power
 DENSE = 4000  # frequencies of a spectrum that is interpolated
 AVERAGES = 40  # averaging times between which the minimum is sought
@@ -154,7 +155,9 @@ def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Place
     Candidates are the largest ones under the model, steps also under its fast terms alone, as a step passes for slow
     drift; the models are fitted again without each of them.
     """
-    needed = {LevelStep: 2.0 * math.log(treated.samples) + RATIO, Settling: SLOW, Swing: SLOW}
+    step = 2.0 * math.log(treated.samples) + RATIO
+    needed = {LevelStep: step, Pulse: step + 2.0 * math.log(len(WIDTHS)), Settling: SLOW, Swing: SLOW}
+    first = needed | {Settling: SEEN, Swing: SEEN}  # before the models are fitted again
     fits, changes = found.ranked[:3], list[Placed]()
 
     def stretch(i: int, parts: Parts, less: Sequence[Placed]) -> tuple[Array, Array, float]:
@@ -170,6 +173,8 @@ def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Place
     def largest(kind: type[LevelChange], of: tuple[Array, Array, float]) -> tuple[LevelChange, float]:
         if kind is LevelStep:
             return largest_step(*step_ratios(*of))
+        if kind is Pulse:
+            return pulse(*of)
         return settling(*of) if kind is Settling else swing(*of)
 
     def stands(i: int, change: LevelChange, without: list[Fitted]) -> bool:
@@ -190,11 +195,14 @@ def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Place
             parts = [*split(model, p), *found.resonances]
             of = [stretch(i, parts, changes) for i in range(len(treated.stretches))]
             longest = max(range(len(of)), key=lambda i: of[i][0].size)
-            kinds = {LevelStep: range(len(of))} | ({Settling: [0], Swing: [longest]} if model is at.model else {})
-            each = [(largest(kind, of[i]), i) for kind in kinds if taken[kind] < CHANGES[kind] for i in kinds[kind]]
-            steps, slow = ([e for e in each if isinstance(e[0][0], LevelStep) is step] for step in (True, False))
-            for (change, ratio), i in [max(e, key=lambda e: e[0][1]) for e in (steps, slow) if e]:
-                if ratio < (needed[LevelStep] if isinstance(change, LevelStep) else SEEN):
+            every = range(len(of))
+            places: dict[type[LevelChange], Sequence[int]] = {LevelStep: every}
+            if model is at.model:
+                places |= {Pulse: every, Settling: [0], Swing: [longest]}
+            each = [(largest(kind, of[i]), i) for kind in places if taken[kind] < CHANGES[kind] for i in places[kind]]
+            groups = ([e for e in each if isinstance(e[0][0], kinds)] for kinds in (LevelStep, Pulse, Settling | Swing))
+            for (change, ratio), i in [max(e, key=lambda e: e[0][1]) for e in groups if e]:
+                if ratio < first[type(change)]:
                     continue
                 data = treated.ordinates(means, less=[*changes, (i, change)])
                 data.hold(found.resonances)

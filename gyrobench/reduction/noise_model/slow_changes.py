@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy import fft, optimize
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.noise_model.pulses import Pulse
 from gyrobench.reduction.noise_model.steps import LevelStep, precision
 
 MOST = 8192  # ordinates: the others have nothing of a change that takes a thousandth of the stretch or more
@@ -56,7 +57,7 @@ class Swing:
         return np.asarray(self.size * np.cos(2.0 * math.pi * np.arange(n) / self.period - self.phase))
 
 
-LevelChange = LevelStep | Settling | Swing
+LevelChange = LevelStep | Pulse | Settling | Swing
 
 
 def settling(x: Array, S: Array, q2: float = 0.0) -> tuple[Settling, float]:

@@ -21,6 +21,7 @@ from scipy import special
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.gap_completion import Completed, complete, mostly_known
 from gyrobench.reduction.noise_model.ordinates import SHORTEST, Ordinates
+from gyrobench.reduction.noise_model.pulses import Pulse
 from gyrobench.reduction.noise_model.sines import sines_of, standing
 from gyrobench.reduction.noise_model.slow_changes import LevelChange, Settling, Swing, without
 from gyrobench.reduction.noise_model.steps import LevelStep
@@ -115,6 +116,11 @@ class Treated:
     def steps(self) -> list[LevelStep]:
         """Return the steps, at their place on the grid."""
         return [replace(x, at=s.start + x.at) for s in self.stretches for x in s.changes if isinstance(x, LevelStep)]
+
+    @property
+    def pulses(self) -> list[Pulse]:
+        """Return the pulses of the rate, at their place on the grid."""
+        return [replace(x, at=s.start + x.at) for s in self.stretches for x in s.changes if isinstance(x, Pulse)]
 
     @property
     def changes(self) -> list[LevelChange]:
