@@ -233,6 +233,7 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
         say("misfit", f"{noise_tables.agreement_text(noise)} No coefficient is stated. {look}")
     found = {"wild": noise_tables.wild_text(noise, p.time, p.units),
              "step": noise_tables.steps_text(noise, p.time, p.units),
+             "pulse": noise_tables.pulses_text(noise, p.time, p.units),
              "settling": noise_tables.settling_text(noise, p.units),
              "swings": noise_tables.swings_text(noise, p.units), "curve": noise_tables.curve_text(noise),
              "taken_off": taken_off_text(p),
@@ -276,7 +277,7 @@ def taken_off_text(p: Prepared) -> str:
 def in_short(p: Prepared, run: RunDocument) -> str:
     """Return lines, changes of the level, wild and frozen samples of a channel in a few words."""
     t, about = p.noise.treatment, (run.series or {}).get("acquisition", {})
-    counts = ((len(p.lines.lines), "line"), (len(t.steps), "step"), (t.wild.size, "wild"))
+    counts = ((len(p.lines.lines), "line"), (len(t.steps), "step"), (len(t.pulses), "pulse"), (t.wild.size, "wild"))
     said = [f"{n} {word}{'s' if n > 1 and word != 'wild' else ''}" for n, word in counts if n]
     said += [*["settles"] * bool(t.settling), *["swings"] * bool(t.swings)]
     said += [f"Gauss-Markov {noise_tables.number(g.sigma.value / p.units.si)} {p.units.unit}, "

@@ -238,6 +238,20 @@ def steps_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
     )
 
 
+def pulses_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
+    """Return the pulses that were taken out, by their angles (velocities of accelerometers)."""
+    if not noise.pulses or noise.slower:
+        return ""
+    unit, si, _ = units.terms["Q"]
+    each = sorted((time[min(at, time.size - 1)], length, size / si, u / si) for at, length, size, u in noise.pulses)
+    said = ", ".join(f"{number(size, u)} {unit} at {number(t)} s" for t, _, size, u in each)
+    longest = number(max(length for _, length, _, _ in each))
+    return (
+        f"Pulses of {said}, within {longest} s, which no noise of the rest makes, are taken out before the model; left "
+        "in, N takes them for its random walk. Look for what touched the instrument."
+    )
+
+
 def settling_text(noise: NoiseModel, units: ChannelUnits) -> str:
     """Return how the drift settles from the beginning of the record on; "" where it does not."""
     s = noise.settling

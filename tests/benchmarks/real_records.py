@@ -51,7 +51,7 @@ def values_of(model: NoiseModel, of: ChannelUnits, published: str) -> dict[str, 
     N, t = model["N"], model.treatment
     low, high = (write_number(v / si, (N.high - N.low) / (4.0 * si)).text for v in (N.low, N.high))
     white = f"{write_number(N.value / si, (N.high - N.low) / (4.0 * si)).text} ({low} to {high}) {unit}"
-    counts = ((t.wild.size, "wild"), (len(t.steps), "steps"), (len(t.lines), "lines"))
+    counts = ((t.wild.size, "wild"), (len(t.steps), "steps"), (len(t.pulses), "pulses"), (len(t.lines), "lines"))
     changes = [f"{c.coefficient or c.term.name.replace('_', '-')} {c.rms.min():.3f} to {c.rms.max():.3f}"
                for c in changing(model.over_time) if c.term.name not in PEAKS]  # fmt: skip
     bands = sum(c.term.name in PEAKS for c in changing(model.over_time))

@@ -179,6 +179,13 @@ class NoiseModel:
         return [replace(s, size=s.size * self.scale.size, u=s.u * self.scale.size) for s in self.treatment.steps]
 
     @property
+    def pulses(self) -> list[tuple[int, float, float, float]]:
+        """Return index, length (s), integral and its u (unit s) of each pulse of the rate that was taken out."""
+        tau0 = self.scale.tau0
+        each = [(p.at, p.width * tau0, p.size * self.scale.size, p.u * self.scale.size) for p in self.treatment.pulses]
+        return [(at, length, size * length, u * length) for at, length, size, u in each]
+
+    @property
     def settling(self) -> Settling | None:
         """Return the drift that settles, which was taken out, in the unit of the rate and s."""
         s = self.treatment.settling
