@@ -384,3 +384,10 @@ def test_a_real_gyro() -> None:
     model = fit_noise(3600.0 * x, 0.01, means=False)  # deg/h
     assert model.agrees and model["N"].value / 60.0 == pytest.approx(2.0, rel=0.3)
     assert model["B"].high < 100.0 and model.filter_words()
+
+
+def test_long_stretches_have_a_length_of_small_factors() -> None:
+    """100,003 is a prime; 100,000 = 2^5 5^5 has small factors.  Of fewer than 100,000 samples none stays out."""
+    rate = np.zeros(100_003)
+    assert treatment.stretches_of(rate) == [slice(0, 100_000)]
+    assert treatment.stretches_of(rate[:99_991]) == [slice(0, 99_991)]
