@@ -15,6 +15,7 @@ from gyrobench.record.drift_columns import ANGLE, DIRECT, FORCE, VELOCITY, harmo
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.channel_units import ChannelUnits, units_of
 from gyrobench.reduction.series.deviations import Deviation
+from gyrobench.reduction.series.motion import TIMES
 from gyrobench.reduction.series.noise_coefficients import slopes
 from gyrobench.reduction.series.quantization import folded
 from gyrobench.reduction.toolkit import Reason, RunDocument, Table, plain
@@ -22,10 +23,11 @@ from gyrobench.units import ARCSEC
 
 from . import noise_tables
 from .noise_tables import number
-from .preparation import Prepared
+from .preparation import Columns, Prepared
 
 KIND_NAMES = {FORCE: "specific force"}  # where the word is another one
 NOTHING = 1e-9  # of the standard deviation of a rate: rounding
+MOTIONS = 6  # that are listed
 MORE_DIGITS = "Record more digits."
 FINER_ANGLE = "Read a finer angle, or reduce one row in several: the change within a sample must be larger."
 
@@ -320,6 +322,22 @@ def rows_text(p: Prepared, run: RunDocument) -> str:
             "those of the mixture; take one row of two."
         )
     return ""
+
+
+def of_motion(columns: Columns) -> list[Reason]:
+    """Return when the instrument was moved."""
+    if columns.moved is None:
+        return []
+    edges = np.flatnonzero(np.diff(columns.moved.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    spans = [f"{number(columns.step * a)} to {number(columns.step * b)} s" for a, b in edges[:MOTIONS].tolist()]
+    more = f" and {len(edges) - MOTIONS} times more" if len(edges) > MOTIONS else ""
+    return [
+        Reason(
+            "drift_record.moved",
+            f"The instrument was not at rest from {', '.join(spans)}{more}: its readings move by {TIMES:g} times their "
+            f"noise and more. {number(columns.step * columns.moved.sum())} s are left out.",
+        )
+    ]
 
 
 def of_rows(run: RunDocument) -> list[Reason]:

@@ -216,7 +216,7 @@ def wild_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
     both = [
         f"{term} {number(noise[term].value / si)} {unit} without them, {number(with_them / si)} with them"
         for term, (unit, si, _) in units.terms.items()
-        if (with_them := noise.with_wild.get(term, 0.0)) and noise[term].determined
+        if (with_them := noise.with_wild.get(term, 0.0)) and noise[term].determined and noise.agrees
     ]
     told = f" {'; '.join(both)}." if both else ""
     return (

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench import frames
 from gyrobench.reduction.noise_model.fit import fit_noise
@@ -17,6 +18,7 @@ from gyrobench.reduction.series.channel_units import FORCE, RATE, ChannelUnits, 
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.lines import Lines
+from gyrobench.reduction.series.motion import moved
 from gyrobench.reduction.series.row_pattern import RowPattern, every_second_row
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.toolkit import Array, Record, ReductionError, attitude_of, plain
@@ -94,6 +96,7 @@ class Columns:
     conventions: list[str] = field(default_factory=list)
     units: dict[str, ChannelUnits] = field(default_factory=dict)  # of the channels that are no rate
     inseparable: list[str] = field(default_factory=list)  # rates of change that follow their columns
+    moved: NDArray[np.bool_] | None = None  # samples in which the instrument was moved, left out; None: none
 
 
 def columns_of(record: Record) -> Columns:
@@ -106,7 +109,13 @@ def columns_of(record: Record) -> Columns:
         start = np.asarray(w["t_start"], dtype=float)
         units = {n: units_of(run.window_units.get(n, "")) for n in rates}
         others, named, left = with_rates_of_change(others, run.window_units, step)
-        return Columns(start - start[0], rates, others, named, step, units=units, inseparable=left)
+        found = moved(rates, step)
+        if found.any():
+            rates = {n: np.where(found, np.nan, v) for n, v in rates.items()}
+        return Columns(
+            start - start[0], rates, others, named, step, units=units, inseparable=left,
+            moved=found if found.any() else None,
+        )  # fmt: skip
     if "mean" not in w or len(w["mean"]) < LEAST:
         raise ReductionError([f"{len(w.get('mean', ()))} windows: a drift record needs at least {LEAST}"])
     site = run_metadata.Location.of(run)

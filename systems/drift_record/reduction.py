@@ -94,7 +94,8 @@ def from_record(record: Record) -> DriftRecordResult:
     stated = not run.measured or "latitude" in (run.series or {}).get("stated", [])
     site = run_metadata.Location.of(run).shown() if stated else {}
     found = replace(found, instrument=run.instrument, site=site, simulated=not run.measured)
-    return replace(found, reasons=[*reasons, *description.of_rows(run)], summary=summary, tables=shared)
+    reasons = [*reasons, *description.of_motion(columns), *description.of_rows(run)]
+    return replace(found, reasons=reasons, summary=summary, tables=shared)
 
 
 def _named(term: str, a: Analysed, several: bool) -> str:
@@ -141,6 +142,7 @@ def analyse(name: str, columns: Columns, run: RunDocument) -> Analysed:
     every = {
         kind: Deviation("", **{n: np.asarray(d[n]) for n in FIELDS})
         for kind, d in series.get("deviations", {}).get(name, {}).items()
+        if columns.moved is None  # they are of every sample
     }
     if every and p.cleaned:  # of the averaging times that the means do not reach, as recorded
         held = {kind: _joined(every[kind], d) for kind, d in held.items()}

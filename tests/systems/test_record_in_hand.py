@@ -1,0 +1,27 @@
+"""A drift record with the moments in which the instrument was put down and taken up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gyrobench.system.system import load_system
+
+
+@pytest.mark.usefixtures("no_arma")
+def test_a_telephone_that_is_taken_up_to_end_its_record(tmp_path: Path) -> None:
+    """Noise of 0.1 deg/s a sample at 100 Hz: N = 0.1 sqrt(0.01) 60 = 0.6 deg/sqrt(h).  The last second turns by 20
+    deg/s: left in, it is 2000 times the noise at 1 s, and there is no model of it and the rest."""
+    n = 6000
+    rate = 0.1 * np.random.default_rng(5).normal(size=n)
+    rate[-100:] += 20.0 * np.sin(2.0 * np.pi * 0.01 * np.arange(100.0))
+    file = tmp_path / "record.csv"
+    file.write_text("rate [deg/s]\n" + "\n".join(f"{x:.6f}" for x in rate) + "\n")
+    system = load_system("drift_record")
+    result = system.reduce(system.read_measured(file, {"type_b": "none", "sampling": "100Hz"}))
+    (said,) = [r.text for r in result.reasons if r.id == "drift_record.moved"]
+    assert said.startswith("The instrument was not at rest from 58.5 to 60 s: ")
+    assert result["N"].interval[0] < 0.6 < result["N"].interval[1]
+    assert result["N"].estimate == pytest.approx(0.6, rel=0.05)
