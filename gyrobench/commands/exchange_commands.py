@@ -94,7 +94,10 @@ def fit(
       gyrobench fit messung.csv --system fixed_position --out messung.toml
     """
     if (slot is None) == (system is None):
-        raise UsageError("fit: --slot SYSTEM.SLOT for an FMU, or --system SYSTEM for a file of data")
+        raise UsageError(
+            "fit: --slot SYSTEM.SLOT for an FMU, or --system SYSTEM for a file of data: the test that is to read it, "
+            "drift_record for a record at rest; all tests: gyrobench list"
+        )
     if slot is not None:
         from gyrobench.workflow.fit_mapping import write_mapping
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import codecs
 import json
+import math
 import re
+import statistics
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
@@ -26,14 +28,17 @@ from gyrobench.record.text_cells import BINARY, cells_of_file, without_mark
 
 SAMPLE = 1 << 22  # bytes that are looked at
 IN_TURN = 20  # rows of another width that are no head of a file
+FIRST = 200  # numbers of a column: it is put into other positions later
 LONG = 2000  # rows from which on a file is taken for time series
-DAYS = ("%d.%m.%Y", "%Y-%m-%d", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y")
+DAYS = (
+    "%d.%m.%Y", "%Y-%m-%d", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d-%b-%Y", "%d %b %Y", "%d-%b-%y",
+)  # fmt: skip
 CLOCKS = (
     "%H:%M:%S", "%H:%M:%S.%f", "%H:%M:%S,%f", "%H:%M", "%I:%M:%S %p", "%I:%M:%S.%f %p", "%I:%M %p", "%H:%M:%S%z",
     "%H:%M:%S.%f%z",
 )  # fmt: skip
 FORMATS = (*(f"{d}{joint}{c}" for d in DAYS for joint in (" ", "T") for c in CLOCKS), *DAYS, *CLOCKS)
-STAMP = r"\d[\d.:,/T -]*(Z|[+-]\d\d:?\d\d|[AaPp][Mm])?"
+STAMP = r"(\d{1,2}[ -][A-Za-z]{3}[ -])?\d[\d.:,/T -]*(Z|[+-]\d\d:?\d\d|[AaPp][Mm])?"
 GROUPED = r"\d{1,3}([.,'’ \u00a0\u202f]\d{3})+([.,]\d*)?"  # with separators of thousands: the reader refuses them
 NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 WITH_UNIT = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\)|(?:/|\bin)\s+(\S+))\s*")
@@ -97,6 +102,7 @@ class FileColumn:
     rises: bool = False  # from row to row
     shown: str = ""  # first values of a column without a name
     exchangeable: bool = False  # day and month of its dates fit the other way round, too
+    level: float = math.nan  # median of its first numbers
 
     @property
     def exponents(self) -> object:
@@ -282,7 +288,8 @@ def _columns(
         empty, name = len(rows) - len(cells), name or f"column_{k + 1}"
         other = time.replace("%d/%m", "%m/%d")  # the one that is tried later
         either = time != other and all(_fits(c, other) for c in cells[:200])
-        found.append(FileColumn((source,), name, unit, written, time, empty, _rises(cells), shown, either))
+        of = (_rises(cells), shown, either, _level(cells))
+        found.append(FileColumn((source,), name, unit, written, time, empty, *of))
     joined: list[FileColumn] = []
     for c in found:
         last = joined[-1] if joined else None
@@ -305,9 +312,19 @@ def _epoch(cells: Sequence[str]) -> str:
     return ""
 
 
+def _numbers(cells: Sequence[str]) -> list[float]:
+    return [float(c.replace(",", ".")) for c in cells]
+
+
+def _level(cells: Sequence[str]) -> float:
+    with suppress(ValueError):
+        return statistics.median(_numbers(cells[:FIRST]))
+    return math.nan
+
+
 def _rises(cells: Sequence[str]) -> bool:
     with suppress(ValueError):
-        numbers = [float(c.replace(",", ".")) for c in cells]
+        numbers = _numbers(cells)
         return len(numbers) > 9 and all(a < b for a, b in pairwise(numbers))
     return False
 

@@ -32,6 +32,7 @@ PX4 = {
 }
 #: beginning of a name in messages of ROS -> unit of their definition
 ROS = {"angular_velocity.": "rad/s", "linear_acceleration.": "m/s2"}
+OBJECTS = "objects of MATLAB ({}): in MATLAB write each as text: writetimetable(NAME, 'NAME.csv'), or writetable"
 Columns = dict[str, Any]  # name, with its unit in brackets -> array of one dimension
 Tables = Iterator[tuple[str, Callable[[], Columns]]]
 
@@ -79,11 +80,15 @@ def _mat(file: Path) -> Tables:
             yield from _hdf5(file)
             return
     from scipy.io import loadmat
+    from scipy.io.matlab import MatlabOpaque
 
     flat: Columns = {}
+    objects = set()
 
     def add(name: str, value: Any) -> None:
-        if getattr(value, "dtype", None) is not None and value.dtype.names and value.size == 1:
+        if isinstance(value, MatlabOpaque):
+            objects.add(value["s2"].item().decode(errors="replace"))
+        elif getattr(value, "dtype", None) is not None and value.dtype.names and value.size == 1:
             for field in value.dtype.names:
                 add(f"{name}.{field}", value[field].reshape(-1)[0])
         else:
@@ -92,6 +97,8 @@ def _mat(file: Path) -> Tables:
     for name, value in loadmat(file).items():
         if not name.startswith("__"):
             add(name, value)
+    if objects and not flat:
+        sys.exit(OBJECTS.format(", ".join(sorted(objects))))
     yield from _by_length(flat)
 
 
@@ -99,9 +106,13 @@ def _hdf5(file: Path) -> Tables:
     import h5py
 
     groups: dict[str, Columns] = {}
+    objects = set()
 
     def visit(path: str, found: Any) -> None:
         if not isinstance(found, h5py.Dataset) or path.startswith("#"):
+            return
+        if "MATLAB_object_decode" in found.attrs:
+            objects.add(found.attrs["MATLAB_class"].decode(errors="replace"))
             return
         unit = found.attrs.get("units", found.attrs.get("unit", ""))
         unit = unit.decode() if isinstance(unit, bytes) else unit if isinstance(unit, str) else ""
@@ -116,6 +127,8 @@ def _hdf5(file: Path) -> Tables:
 
     content = h5py.File(file, "r")
     content.visititems(visit)
+    if objects and not groups:
+        sys.exit(OBJECTS.format(", ".join(sorted(objects))))
     for group, arrays in groups.items():
         several = list(_by_length(arrays))
         for name, columns in several:

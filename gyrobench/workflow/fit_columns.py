@@ -29,6 +29,7 @@ from gyrobench.record.drift_columns import OF_EACH
 from gyrobench.record.log_files import as_text, heads_of, is_log, tables_of
 from gyrobench.system.suite import Suite
 from gyrobench.system.system import System
+from gyrobench.workflow import axes_of_gravity
 from gyrobench.workflow.empty_record import empty_record
 from gyrobench.workflow.inputs import load_test
 
@@ -119,15 +120,17 @@ def _proposal(file: Path, test: System | Suite, table: str, text: Path) -> Colum
     wanted, stated = wanted_columns(test)
     layout = find_layout(text)
     if "channel" in test.options:
-        found, wanted = _any_names(layout)
+        found, wanted = _any_names(layout, f"{file.stem} {table}")
     else:
         if layout.rows > LONG and "mean" in "".join(n for n, _ in wanted) and ("t_start", "s") in wanted:
             wanted = series_columns(wanted)
         found = match_columns(wanted, layout)
         samples = _of_header(test.measured_data.samples) if isinstance(test, System) and test.measured_data else []
-        if len(of_samples := match_columns(samples, layout)) > len(found):
-            found, wanted, stated = of_samples, samples, {"attitudes": "unknown", **stated}
-    if "channel" in test.options and "time" not in found:
+        if samples and len(of_samples := _of_samples(samples, layout)) > len(found):
+            forces = axes_of_gravity.unit_of([of_samples[n] for n, _ in samples[-3:] if n in of_samples])
+            found, wanted = of_samples, [(n, forces if forces and n[0] == "a" else u) for n, u in samples]
+            stated = {"attitudes": "unknown", **stated}
+    if "sampling" in test.options and wanted[0] == ("time", "s") and "time" not in found:
         stated = {"sampling": "100Hz", **stated}
     if "channel" in test.options and any(OF_EACH.fullmatch(name) for name in found):
         stated = {COUNTS: "increments", **stated}
@@ -160,9 +163,22 @@ def _timed(column: FileColumn) -> bool:
     return bool(column.time or _is(column, "s") or (called and not column.unit))
 
 
-def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[str, str]]]:
+def _of_samples(samples: Sequence[tuple[str, str]], layout: FileLayout) -> dict[str, FileColumn]:
+    """Return the columns of a logger's file; samples: time, three rates, three forces, with their units."""
+    found = match_columns(samples, layout)
+    if "time" not in found and (rising := [c for c in layout.columns if c.rises and not c.unit]):
+        found["time"] = rising[0]
+    left = [c for c in layout.columns if c not in found.values() and not c.unit]
+    names = [n for n, _ in samples]
+    for mine, triad in zip((names[-3:], names[1:4]), axes_of_gravity.triads(left), strict=True):
+        if not any(n in found for n in mine):
+            found |= dict(zip(mine, triad, strict=False))
+    return found
+
+
+def _any_names(layout: FileLayout, called: str) -> tuple[dict[str, FileColumn], list[tuple[str, str]]]:
     """Return the columns of a drift record, and their names with units that fit: time, then rates, angles and
-    temperatures under their own names, those without a unit by what they are called."""
+    temperatures under their own names, those without a unit by what they, or the file, are called and by gravity."""
     found: dict[str, FileColumn] = {}
     wanted = []
     times = [c for c in layout.columns if _timed(c)]
@@ -181,11 +197,23 @@ def _any_names(layout: FileLayout) -> tuple[dict[str, FileColumn], list[tuple[st
         if kind and name not in found and not (timed and name != "time"):
             found[name] = c
             wanted.append((name, kind))
+    forces = [n for n, u in wanted if u == "m/s2" and not found[n].unit]
+    for three in (forces[k : k + 3] for k in range(0, len(forces), 3)):
+        unit = axes_of_gravity.unit_of([found[n] for n in three])
+        wanted = [(n, unit if unit and n in three else u) for n, u in wanted]
     if all(u in ("s", "K", "degC") for _, u in wanted):
-        axes = {c.name: c for c in layout.columns if c.name in ("x", "y", "z") and not c.unit}
+        axes = {c.name: c for c in layout.columns if c.name.casefold() in ("x", "y", "z") and not c.unit}
         if len(axes) == 3:
             found |= axes
-            wanted += [(name, "deg/s") for name in axes]
+            of_rates = re.search("gyr|angular|rate", called, re.I)
+            unit = "" if of_rates else axes_of_gravity.unit_of([*axes.values()])
+            wanted += [(name, unit or "deg/s") for name in axes]
+    if all(u in ("s", "K", "degC") for _, u in wanted):
+        left = [c for c in layout.columns if c not in found.values() and not c.unit]
+        for name, triad in zip(("acc", "gyro"), axes_of_gravity.triads(left), strict=True):
+            unit = axes_of_gravity.unit_of(triad) if name == "acc" else "deg/s"
+            found |= {f"{name}_{a}": c for a, c in zip("xyz", triad, strict=False)}
+            wanted += [(f"{name}_{a}", unit) for a, _ in zip("xyz", triad, strict=False)]
     if all(u in ("s", "K", "degC") for _, u in wanted):
         wanted.append(("rate", "deg/s"))
         if len(rest := [c for c in layout.columns if c not in found.values()]) == 1:

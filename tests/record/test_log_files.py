@@ -250,6 +250,30 @@ def test_a_damaged_file_ends_in_a_message(end: str, tmp_path: Path) -> None:
         as_text(file)
 
 
+def test_objects_of_matlab_are_named(tmp_path: Path) -> None:
+    """A timetable is a variable of class 17: three texts of 8 bits, and an array that says where its values are."""
+    import h5py
+    from scipy.io import savemat
+
+    savemat(tmp_path / "array.mat", {"a": np.zeros((6, 1), dtype=np.uint32)})
+    data = (tmp_path / "array.mat").read_bytes()
+
+    def element(kind: int, content: bytes) -> bytes:
+        return struct.pack("<II", kind, len(content)) + content + bytes(-len(content) % 8)
+
+    texts = b"".join(element(1, t) for t in (b"Acceleration", b"MCOS", b"timetable"))
+    (tmp_path / "log.mat").write_bytes(data[:128] + element(14, element(6, bytes([17, *[0] * 7])) + texts + data[128:]))
+    with pytest.raises(DataError, match=r"objects of MATLAB \(timetable\).*writetimetable"):
+        tables_of(tmp_path / "log.mat")
+    with h5py.File(tmp_path / "new.mat", "w", userblock_size=512) as log:
+        log["Acceleration"] = np.zeros((1, 6), dtype=np.uint32)
+        log["Acceleration"].attrs.update({"MATLAB_class": np.bytes_("table"), "MATLAB_object_decode": 3})
+    with (tmp_path / "new.mat").open("r+b") as log:
+        log.write(b"MATLAB 7.3 MAT-file")
+    with pytest.raises(DataError, match=r"objects of MATLAB \(table\)"):
+        tables_of(tmp_path / "new.mat")
+
+
 def test_a_missing_package_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "h5py.py").write_text("raise ImportError('none', name='h5py')")
     file = tmp_path / "log.h5"
