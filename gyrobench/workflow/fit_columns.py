@@ -35,6 +35,7 @@ from gyrobench.workflow.inputs import load_test
 
 OPTIONAL = ("std", "n", "flagged")
 COUNTS = "counts"  # of columns that are called as the angle or velocity of each sample
+FOUND = (COUNTS, "attitudes")  # what the columns tell
 KINDS = ("rad/s", "rad", "m/s2", "K")  # of the columns of a drift record, which has any names
 #: what columns without a unit are called -> unit that may be meant
 OTHER = r"(?!.*(time|stamp|_dt\b|count|clip|_id\b|status))"  # what belongs to a rate or force and is none
@@ -85,7 +86,8 @@ class ColumnProposal:
             if name == "t_end" and "t_start" in self.found:
                 continue
             if name == "time" and "sampling" in self.stated:
-                problems.append('no column of times: write [columns.time], or sampling = "100Hz" below [set]')
+                means = "; without both each row is the mean of a position" if "attitudes" in self.stated else ""
+                problems.append(f'no column of times: write [columns.time], or sampling = "100Hz" below [set]{means}')
                 continue
             unused = ", ".join(f"'{c.name}'" for c in self.layout.columns if c not in self.found.values()) or "none"
             source = '"ITS NAME"' if self.layout.names else "ITS NUMBER"
@@ -129,6 +131,8 @@ def _proposal(file: Path, test: System | Suite, table: str, text: Path) -> Colum
         if samples and len(of_samples := _of_samples(samples, layout)) > len(found):
             forces = axes_of_gravity.unit_of([of_samples[n] for n, _ in samples[-3:] if n in of_samples])
             found, wanted = of_samples, [(n, forces if forces and n[0] == "a" else u) for n, u in samples]
+            if not any(n in found for n, _ in samples[1:4]):
+                wanted = [(n, u) for n, u in wanted if n[0] != "g"]
             stated = {"attitudes": "unknown", **stated}
     if "sampling" in test.options and wanted[0] == ("time", "s") and "time" not in found:
         stated = {"sampling": "100Hz", **stated}
@@ -170,7 +174,10 @@ def _of_samples(samples: Sequence[tuple[str, str]], layout: FileLayout) -> dict[
         found["time"] = rising[0]
     left = [c for c in layout.columns if c not in found.values() and not c.unit]
     names = [n for n, _ in samples]
-    for mine, triad in zip((names[-3:], names[1:4]), axes_of_gravity.triads(left), strict=True):
+    found_triads = axes_of_gravity.triads(left)
+    if len(left) == len(layout.columns) - ("time" in found) == 3:  # positions are of accelerometers at least
+        found_triads = left, []
+    for mine, triad in zip((names[-3:], names[1:4]), found_triads, strict=True):
         if not any(n in found for n in mine):
             found |= dict(zip(mine, triad, strict=False))
     return found
@@ -253,10 +260,10 @@ def map_text(
         f"# Not used: {', '.join(c.name for c in unused) or 'none'}",
         *(f"# {c.name}: {c.shown} ..." for c in unused if c.shown),
         "#",
-        f"{'' if COUNTS in stated else '# '}[set]  # what the test needs to know, here or by --set",
+        f"{'' if any(n in stated for n in FOUND) else '# '}[set]  # what the test needs to know, here or by --set",
     ]
     lines += [
-        f"{'' if n == COUNTS else '# '}{n} = {_quoted(v)}" for n, v in stated.items() if not n.startswith("phase ")
+        f"{'' if n in FOUND else '# '}{n} = {_quoted(v)}" for n, v in stated.items() if not n.startswith("phase ")
     ]
     return "\n".join(lines) + "\n", problems
 

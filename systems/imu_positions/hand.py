@@ -53,8 +53,8 @@ class HandReduction(ChannelTests[HandSetup]):
 
     @property
     def blind(self) -> bool:
-        """True where gyros read counts, and no turns tell their scale."""
-        return "g" in self.setup.counts and not self.at.enough
+        """True where there are no gyros, or they read counts and no turns tell their scale."""
+        return not self.at.gyro.size or ("g" in self.setup.counts and not self.at.enough)
 
     @cached_property
     def at(self) -> Positions:
@@ -71,8 +71,14 @@ class HandReduction(ChannelTests[HandSetup]):
     def of_record(cls, record: Record) -> DriftTestResult:
         return cls.reduce(record.windows, HandSetup.of_record(record))
 
+    @property
+    def _columns(self) -> tuple[str, ...]:
+        """Columns of windows that are needed: none of gyros where there are no gyros."""
+        gyros = any(n.startswith("mean_g") for n in self.windows)
+        return tuple(n for n in COLUMNS if gyros or not n.startswith("mean_g"))
+
     def problems(self) -> list[str]:
-        if problems := self.setup.site_problems() + window_problems(self.windows, COLUMNS):
+        if problems := self.setup.site_problems() + window_problems(self.windows, self._columns):
             return problems
         at = self.at
         if len(at.start) < norms.LEAST:
@@ -112,7 +118,7 @@ class HandReduction(ChannelTests[HandSetup]):
         ]
 
     def reasons(self) -> list[Reason]:
-        if self.at.enough:
+        if self.at.enough or not self.at.gyro.size:
             return []
         text = (
             "There are no samples of the turns between the positions, or not of all, or fewer than 6 turns; not "

@@ -96,14 +96,17 @@ class Positions:
         self.setup = s = setup
         phase = np.asarray(windows["phase"]).astype(int)
         rest = np.isin(phase, list(s.rest)) if s.rest else np.ones(phase.size, dtype=bool)
-        w = {n: np.asarray(windows[n], dtype=float)[rest] for n in COLUMNS}
+        mine = [c for c in CHANNELS if f"mean_{c.name}" in windows]
+        w = {n: np.asarray(windows[n], dtype=float)[rest] for n in COLUMNS if n in windows}
         new = np.concatenate([[True], np.diff(phase[rest]) != 0])
         group = np.cumsum(new) - 1
         length = w["t_end"] - w["t_start"]
         total = np.bincount(group, length)
         self.start, self.end = w["t_start"][new], w["t_end"][np.concatenate([new[1:], [True]])]
-        read = {c.name: np.bincount(group, length * w[f"mean_{c.name}"]) / total for c in CHANNELS}
-        self.acc, self.gyro = (np.column_stack([read[k + a] for a in AXES]) for k in "ag")
+        read = {c.name: np.bincount(group, length * w[f"mean_{c.name}"]) / total for c in mine}
+        self.acc = np.column_stack([read[f"a{a}"] for a in AXES])
+        #: readings of the gyros; (n, 0) where there are none
+        self.gyro = np.array([v for n, v in read.items() if n[0] == "g"]).reshape(-1, len(self.acc)).T
 
     @cached_property
     def scale_a(self) -> tuple[Array, Array]:

@@ -3,14 +3,15 @@
     time [s],gx [deg/s],gy [deg/s],gz [deg/s],ax [g],ay [g],az [g]
 
 CSV or Parquet; other names and units by a column map (gyrobench fit).  Without a unit, or [counts]: counts.  Positions
-at rest are found (still.py), or numbered in a column ``position`` (0 or empty: moved).
+at rest are found (still.py), or numbered in a column ``position`` (0 or empty: moved).  Without gyros: accelerometers
+alone.  Without a time and a sampling rate each row is the mean of a position.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from itertools import pairwise
+from collections.abc import Mapping, Sequence
+from itertools import combinations, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,7 @@ from gyrobench.system.lab_record import TEXTS, measured_run, set_options
 from gyrobench.system.system import System
 
 from . import lost, norms, still
-from .channels import CHANNELS
+from .channels import CHANNELS, ImuInstrument
 
 UP_DOWN = "up_down"  # option attitudes
 
@@ -36,6 +37,7 @@ SHOWN = {"rad/s": "deg/h", "m/s2": "mg"}  # unit of a channel -> in warnings
 FEW = 20  # samples of a position, or of a piece of it
 MOVED = 6.0  # times the usual scatter
 PIECES = 20  # of a position up or down
+MEANS = 500  # rows at most that are a position each
 
 
 def read_log(system: System, data: Path, values: Mapping[str, str]) -> Record:
@@ -49,108 +51,149 @@ def read_log(system: System, data: Path, values: Mapping[str, str]) -> Record:
             system.set(name, values[name])  # says which options there are
     problems = faults(table.head.statements, Keys((*system.options, *TEXTS)))
     problems += set_options(system, table.head.statements, values)
-    if "latitude" not in system.given:
-        problems.append("'latitude' is not given: write '# latitude = 45.75deg' in the file or --set latitude=45.75deg")
     table.head.names[:] = [COUNTS.sub(" [1]", name) for name in table.head.names]
-    columns, unclear = _columns(table.head)
+    up_down = system["attitudes"] == UP_DOWN
+    mine, columns, unclear = _columns(table.head, up_down)
+    gyros = any(c.gyro for c in mine)
+    if "latitude" not in system.given and (gyros or "gravity" not in system.given):
+        problems.append("'latitude' is not given: write '# latitude = 45.75deg' in the file or --set latitude=45.75deg")
     problems += unclear
     if problems:
         raise DataError(data, problems)
     blocks = list(table.blocks(columns))
     samples = {c.name: np.concatenate([b[c.name] for b in blocks]) for c in columns}
-    time, every, problems = _checked(samples)
+    rows = samples[columns[-1].name].size
+    means = "time" not in samples and not system["sampling"]
+    if means and (up_down or rows > MEANS):
+        raise DataError(
+            data,
+            [f"column 'time [s]' is missing, and no sampling rate is given: write '# sampling = 100Hz' in the file or "
+             f"--set sampling=100Hz (without both each row is the mean of a position, of {MEANS} at most)"],
+        )  # fmt: skip
+    if "time" not in samples:
+        samples["time"] = np.arange(float(rows)) / (system["sampling"] or 1.0)
+    time, every, problems = _checked(samples, mine, norms.LEAST if means else 2 * still.SHORT)
     if problems:
         raise DataError(data, problems)
-    up_down = system["attitudes"] == UP_DOWN
-    windows, problems = _windows(time, every, samples, 2 if up_down else norms.LEAST, PIECES if up_down else 1)
+    notes: list[str] = []
+    if means:
+        windows = _means(time, every, mine)
+    else:
+        least = 2 if up_down else norms.LEAST
+        windows, problems, notes = _windows(time, every, mine, samples, least, PIECES if up_down else 1)
     if problems:
         raise DataError(data, problems)
     said = {**table.head.comments, **values}
     run = measured_run(system, [], {n: said[n] for n in TEXTS if n in said})
     si = {c.name: c.unit for c in columns}
-    run.window_units = {f"mean_{c.name}": si[c.name] for c in CHANNELS} | {"t_start": "s", "t_end": "s"}
-    channels = {"time": time, **{f"imu.rate[{k + 1}]": every[:, k] for k in range(3)}}
+    run.window_units = {f"mean_{c.name}": si[c.name] for c in mine} | {"t_start": "s", "t_end": "s"}
+    if means:
+        return Record(windows, {}, run)
+    channels = {"time": time, **{f"imu.rate[{k + 1}]": every[:, k] for k, c in enumerate(mine) if c.gyro}}
     run.units = {n: si["gx"] for n in channels if n != "time"}
-    run.doubts = _coarse(time, every, windows, si) + ([] if up_down else lost.doubts(time, every[:, :3]))
-    return Record(windows, channels, run)
+    run.notes = notes
+    run.doubts = _coarse(time, every, mine, windows, si)
+    run.doubts += [] if up_down or not gyros else lost.doubts(time, every[:, :3])
+    return Record(windows, channels if gyros else {}, run)
 
 
-def _columns(head: Head) -> tuple[list[CsvColumn], list[str]]:
-    """Return the columns to read, in units of rate and force, or as counts, and what is wrong with them."""
+def _columns(head: Head, up_down: bool) -> tuple[list[ImuInstrument], list[CsvColumn], list[str]]:
+    """Return the instruments that are there, the columns to read, in units of rate and force, or as counts, and what is
+    wrong with them.
+    """
     there, problems = named(head), list[str]()
-    lost = [c.name for c in CHANNELS if c.name not in there]
-    if lost:
+    gyros = up_down or any(c.name in there for c in CHANNELS if c.gyro)
+    mine = [c for c in CHANNELS if gyros or not c.gyro]
+    if lost := [c.name for c in mine if c.name not in there]:
         problems.append(
             f"columns not found: {', '.join(lost)}; columns of the file: {', '.join(there)}. Other names are mapped: "
             "gyrobench fit FILE --system imu_positions --out map.toml, then --columns map.toml"
         )
-    columns = [CsvColumn("time", "s", "time of the sample")]
+    columns = [CsvColumn("time", "s", "time of the sample")] if "time" in there else []
     for kind, si in (("g", "rad/s"), ("a", "m/s2")):
-        mine = [kind + a for a in "xyz" if kind + a in there]
-        counted = [n for n in mine if (there[n] or "1") == "1"]
-        if counted and len(counted) < len(mine):
-            problems.append(f"columns {', '.join(mine)}: counts and another unit in one triad")
-        columns += [CsvColumn(n, "1" if n in counted else si, "reading") for n in mine]
-    return columns + ([NUMBER] if "position" in there else []), problems
+        triad = [kind + a for a in "xyz" if kind + a in there]
+        counted = [n for n in triad if (there[n] or "1") == "1"]
+        if counted and len(counted) < len(triad):
+            problems.append(f"columns {', '.join(triad)}: counts and another unit in one triad")
+        columns += [CsvColumn(n, "1" if n in counted else si, "reading") for n in triad]
+    return mine, columns + ([NUMBER] if "position" in there else []), problems
 
 
-def _checked(samples: Mapping[str, Array]) -> tuple[Array, Array, list[str]]:
-    """Return time, the six channels (n, 6), and what is wrong with them; rows in which one is missing are left out."""
+def _checked(samples: Mapping[str, Array], mine: Sequence[ImuInstrument], least: int) -> tuple[Array, Array, list[str]]:
+    """Return time, the channels (n, k), and what is wrong with them; rows in which one is missing are left out."""
     time = samples["time"]
-    every = np.column_stack([samples[c.name] for c in CHANNELS])
+    every = np.column_stack([samples[c.name] for c in mine])
     there = np.isfinite(time) & np.all(np.isfinite(every), axis=1)
     time, every = time[there], every[there]
     problems = []
-    if time.size < 2 * still.SHORT:
+    if time.size < least:
         return time, every, [f"{time.size} complete rows: no record of positions"]
     back = np.flatnonzero(np.diff(time) <= 0.0)
     if back.size:
         problems.append(f"time does not increase at t = {time[back[0] + 1]:.9g} s and in {back.size - 1} more rows")
-    for c in CHANNELS:
-        column = every[:, CHANNELS.index(c)]
-        if np.ptp(column) == 0.0:
+    for k, c in enumerate(mine):
+        if np.ptp(every[:, k]) == 0.0:
             problems.append(f"column {c.name}: all values are the same, the {c.words} was not read")
     alike = [
-        (a.name, b.name) for k, a in enumerate(CHANNELS) for b in CHANNELS[k + 1 :]
-        if a.kind == b.kind and np.array_equal(every[:, CHANNELS.index(a)], every[:, CHANNELS.index(b)])
-        and np.ptp(every[:, CHANNELS.index(a)]) > 0.0
+        (mine[i].name, mine[j].name) for i, j in combinations(range(len(mine)), 2)
+        if mine[i].kind == mine[j].kind and np.array_equal(every[:, i], every[:, j]) and np.ptp(every[:, i]) > 0.0
     ]  # fmt: skip
     problems += [f"columns {a} and {b} are the same: one of them stands twice" for a, b in alike]
     return time, every, problems
 
 
+def _means(time: Array, every: Array, mine: Sequence[ImuInstrument]) -> dict[str, AnyArray]:
+    """Return a row for each mean of a position, one after the other in a second each."""
+    out: dict[str, AnyArray] = {"phase": np.arange(1, time.size + 1), "t_start": time, "t_end": time + 1.0}
+    return out | {f"mean_{c.name}": every[:, k] for k, c in enumerate(mine)}
+
+
 def _windows(
-    time: Array, every: Array, samples: Mapping[str, Array], least: int, pieces: int
-) -> tuple[dict[str, AnyArray], list[str]]:
-    """Return a row for each of so many pieces of each position at rest, and what is wrong with them."""
+    time: Array, every: Array, mine: Sequence[ImuInstrument], samples: Mapping[str, Array], least: int, pieces: int
+) -> tuple[dict[str, AnyArray], list[str], list[str]]:
+    """Return a row for each of so many pieces of each position at rest, what is wrong with them, and notes."""
+    notes = []
     if "position" in samples:
         found = [(a, b) for a, b in still.labelled(samples["position"]) if b - a >= FEW]
     else:
         found = still.at_rest(time, every)
+        scatter = np.array([every[a:b].std(axis=0) for a, b in found]).reshape(-1, len(mine))
+        crept = np.any(scatter > MOVED * np.maximum(np.median(scatter, axis=0), 1e-300), axis=1) & (len(found) > 0)
+        if crept.any():
+            at = ", ".join(f"{time[a]:.6g} s" for (a, _), moved in zip(found, crept, strict=True) if moved)
+            notes.append(
+                f"Not taken for a position at rest, though each second is quiet: the stretches from t = {at} on, which "
+                f"scatter {MOVED:g} times as much as the others and more."
+            )
+            found = [place for place, moved in zip(found, crept, strict=True) if not moved]
     if len(found) < least:
         how = "numbered" if "position" in samples else "found in the samples (at rest for two seconds or more)"
         why = "an axis up and down" if pieces > 1 else "three accelerometers in unknown attitudes"
-        return {}, [
-            f"{len(found)} positions at rest {how}; at least {least} in different directions are needed for {why}"
-        ]
+        return (
+            {},
+            [f"{len(found)} positions at rest {how}; at least {least} in different directions are needed for {why}"],
+            notes,
+        )
     cuts = [np.linspace(a, b - 1, min(pieces, (b - a) // FEW) + 1).astype(int) for a, b in found]
     rows = [(k, a, b) for k, c in enumerate(cuts, 1) for a, b in pairwise(c.tolist())]
     phase, start, end = (np.array(x) for x in zip(*rows, strict=True))
     out: dict[str, AnyArray] = {"phase": phase, "t_start": time[start], "t_end": time[end], "n": end - start}
-    for k, c in enumerate(CHANNELS):
+    for k, c in enumerate(mine):
         out[f"mean_{c.name}"] = np.array([every[a:b, k].mean() for _, a, b in rows])
         out[f"std_{c.name}"] = np.array([every[a:b, k].std(ddof=1) for _, a, b in rows])
     rest = np.zeros(time.size, dtype=bool)
     for a, b in found:
         rest[a:b] = True
-    return out, _moved(out) + _clipped(time, every, rest)
+    return out, _moved(out, mine) + _clipped(time, every, mine, rest), notes
 
 
-def _coarse(time: Array, every: Array, windows: Mapping[str, AnyArray], si: Mapping[str, str]) -> list[str]:
+def _coarse(
+    time: Array, every: Array, mine: Sequence[ImuInstrument], windows: Mapping[str, AnyArray], si: Mapping[str, str]
+) -> list[str]:
     """Return the channels whose words are larger than their noise at rest averages out."""
     cuts = [np.searchsorted(time, windows[n]).tolist() for n in ("t_start", "t_end")]
     notes = []
-    for k, c in enumerate(CHANNELS):
+    for k, c in enumerate(mine):
         seen = sampling.Successive()
         for a, b in zip(*cuts, strict=True):
             seen.add(every[a:b, k])
@@ -158,21 +201,21 @@ def _coarse(time: Array, every: Array, windows: Mapping[str, AnyArray], si: Mapp
     return [text for text in notes if text]
 
 
-def _clipped(time: Array, every: Array, rest: NDArray[np.bool_]) -> list[str]:
+def _clipped(time: Array, every: Array, mine: Sequence[ImuInstrument], rest: NDArray[np.bool_]) -> list[str]:
     """Return the channels that stand at one end of their values: their readings there are no means of an input."""
-    stretches = {c: still.held(every[:, k], rest) for k, c in enumerate(CHANNELS)}
+    stretches = {(k, c): still.held(every[:, k], rest) for k, c in enumerate(mine)}
     return [
-        f"column {c.name}: {b - a} samples from t = {time[a]:.6g} s on are all {every[a, CHANNELS.index(c)]:.6g}, the "
+        f"column {c.name}: {b - a} samples from t = {time[a]:.6g} s on are all {every[a, k]:.6g}, the "
         f"largest or smallest that there is: the {c.words} is beyond its range. Take a larger range"
         + (", turn more slowly, or leave out the samples of the turns" if c.gyro else "")
-        for c, (a, b) in ((c, s) for c, s in stretches.items() if s)
+        for (k, c), (a, b) in ((of, s) for of, s in stretches.items() if s)
     ]
 
 
-def _moved(windows: Mapping[str, AnyArray]) -> list[str]:
+def _moved(windows: Mapping[str, AnyArray], mine: Sequence[ImuInstrument]) -> list[str]:
     """Return the positions in which a channel scatters far more than it usually does."""
     problems = []
-    for c in CHANNELS:
+    for c in mine:
         scatter = windows[f"std_{c.name}"] / max(float(np.median(windows[f"std_{c.name}"])), 1e-300)
         problems += [
             f"position {windows['phase'][k]} (t = {windows['t_start'][k]:.6g} s): {c.name} scatters {scatter[k]:.3g} "

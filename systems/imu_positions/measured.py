@@ -36,6 +36,7 @@ TEMPLATE = """\
 #   into 10 positions or more, spread over all directions, in which it stands still for some seconds; 24 are better.
 #   Columns time [s], gx, gy, gz [deg/s], ax, ay, az [g], or [counts] where the scale factors are not known
 #   (in a column map unit = "1").  Positions are found, or numbered in a column 'position' (0 or empty: moved).
+#   gx, gy, gz may be missing.  Without time: '# sampling = 100Hz', or each row is the mean of a position.
 #   '# attitudes = up_down': one axis up and down.
 phase,t_start [s],t_end [s],outer_start [deg],outer_end [deg],inner_start [deg],inner_end [deg],mean_gx [deg/s],mean_gy [deg/s],mean_gz [deg/s],mean_ax [m/s2],mean_ay [m/s2],mean_az [m/s2]
 """  # noqa: E501

@@ -94,6 +94,7 @@ class ImuPositions(TableTest):
             "dwell": Option(60.0, "s", "averaging time in each position"),
             "windows": Option(4, int, "averages a position", 1, 100),
             "rate": Option("30deg/s", "rad/s", "rate of the turns; 0: none", 0.0, 20.0),
+            "sampling": Option(0.0, "Hz", "samples of a file without a column time: sampling rate", 0.0),
             "cycles": Option(1, int, "times that positions and turns are gone through", 1, 16),
             "turns": Option(5, int, "whole turns in each sense about each axis of the case; 0: none", 0, 100),
             "rate_axes": Option("xyz", str, "axes of the case about which it is turned"),

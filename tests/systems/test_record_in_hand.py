@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gyrobench.report import write
 from gyrobench.system.system import load_system
 
 
@@ -25,3 +26,21 @@ def test_a_telephone_that_is_taken_up_to_end_its_record(tmp_path: Path) -> None:
     assert said.startswith("The instrument was not at rest from 58.5 to 60 s: ")
     assert result["N"].interval[0] < 0.6 < result["N"].interval[1]
     assert result["N"].estimate == pytest.approx(0.6, rel=0.05)
+
+
+@pytest.mark.usefixtures("chinese_font")
+@pytest.mark.long
+def test_correlated_gyros_that_were_moved_in_chinese(tmp_path: Path) -> None:
+    """Half of the variance of each is that of all: they are correlated, without a common line."""
+    rng = np.random.default_rng(6)
+    rates = rng.normal(size=(4000, 3)) + rng.normal(size=(4000, 1))
+    rates[1000:1200] += 300.0 * np.sin(0.06 * np.arange(200.0))[:, None]
+    file = tmp_path / "record.csv"
+    rows = "\n".join(",".join(f"{v:.5f}" for v in row) for row in rates)
+    file.write_text(f"gyro_x [deg/h],gyro_y [deg/h],gyro_z [deg/h]\n{rows}\n")
+    system = load_system("drift_record")
+    record = system.read_measured(file, {"type_b": "none", "sampling": "100Hz"})
+    result = system.reduce(record)
+    assert any(t.id == "correlations" for t in result.tables)
+    write(result, tmp_path / "out", language="zh")  # a sentence without its Chinese is an error
+    assert "并非静止" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
