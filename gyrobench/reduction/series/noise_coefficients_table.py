@@ -12,7 +12,7 @@ from gyrobench import units
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.noise_model.fit import fit_noise
-from gyrobench.reduction.noise_model.treatment import LONG
+from gyrobench.reduction.noise_model.treatment import LONG, Treated
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.noise_coefficients import Estimate
 from gyrobench.result import DriftTestResult, Table
@@ -61,14 +61,19 @@ def noise_coefficients_table(result: DriftTestResult, record: Record, residual: 
     caption = f"IEEE 952, from {int(np.isfinite(rate).sum())} means of {length:g} s by their noise model"
     if not noise.agrees:
         caption = f"The noise model does not describe the record, so that no coefficient is stated. {caption}"
-    elif (t := noise.treatment).lines or t.changes or t.wild.size:
-        caption = (
-            f"{caption}; taken out before: {len(t.lines)} lines, {len(t.changes)} steps or slow changes, {t.wild.size} "
-            "wild values"
-        )
+    elif taken := _taken(noise.treatment):
+        caption = f"{caption}; taken out before: {taken}"
     caption = f"{caption}. {RESIDUAL}" if residual else caption
     columns = ["coefficient", "value", "95 % from", "95 % to", "unit", "finding"]
     return [Table("noise_coefficients", "Noise coefficients", caption, columns, rows)]
+
+
+def _taken(t: Treated) -> str:
+    """Return what was taken out before the model, in words."""
+    level = len(t.changes) - len(t.pulses)
+    counts = ((len(t.lines), "line"), (level, "step or slow change"), (len(t.pulses), "pulse"), (t.wild.size, "wild value"))
+    several = {"step or slow change": "steps or slow changes"}
+    return ", ".join(f"{n} {word if n == 1 else several.get(word, f'{word}s')}" for n, word in counts if n)
 
 
 def _row(name: str, e: Estimate, si: float, unit: str, stated: bool, no_end: bool) -> list[Any]:
