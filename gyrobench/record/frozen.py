@@ -87,6 +87,10 @@ class EqualSamples:
         if best[0] > self.longest.get(name, (0, 0.0))[0]:
             self.longest[name] = best
 
+    def share(self, name: str) -> float:
+        """Return which part of the samples of a channel equal the one before."""
+        return self.equal.get(name, 0) / max(self.samples, 1)
+
     def frozen(self) -> dict[str, tuple[int, float]]:
         """Return the channels with a run of equal samples that noise does not make: its samples, its time, s."""
         out = {}

@@ -231,6 +231,7 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
     noise = p.noise
     if not noise.agrees:
         look = "See the figures; look for lines that wander, steps, or noise that changes with time."
+        look = MORE_DIGITS if noise.rounded_away else look
         look = "Take the record as it was sampled." if noise.slower else look
         say("misfit", f"{noise_tables.agreement_text(noise)} No coefficient is stated. {look}")
     found = {"wild": noise_tables.wild_text(noise, p.time, p.units),
@@ -278,13 +279,13 @@ def taken_off_text(p: Prepared) -> str:
 
 def in_short(p: Prepared, run: RunDocument) -> str:
     """Return lines, changes of the level, wild and frozen samples of a channel in a few words."""
-    t, about = p.noise.treatment, (run.series or {}).get("acquisition", {})
+    t = p.noise.treatment
     counts = ((len(p.lines.lines), "line"), (len(t.steps), "step"), (len(t.pulses), "pulse"), (t.wild.size, "wild"))
     said = [f"{n} {word}{'s' if n > 1 and word != 'wild' else ''}" for n, word in counts if n]
     said += [*["settles"] * bool(t.settling), *["swings"] * bool(t.swings)]
     said += [f"Gauss-Markov {noise_tables.number(g.sigma.value / p.units.si)} {p.units.unit}, "
              f"{noise_tables.number(g.tau.value)} s" for g in p.noise.processes if g.tau.determined]  # fmt: skip
-    said += ["frozen"] if p.name in about.get("frozen", {}) else []
+    said += ["frozen"] if frozen_text(p, run) else []
     said += ["at its range"] if saturated_text(p, run) else []
     said += ["coarse"] if coarse_text(p.name, run) else []
     changes = noise_tables.levels_text(p.noise) or noise_tables.over_time_text(p.noise)

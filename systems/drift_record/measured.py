@@ -90,7 +90,12 @@ def read(system: System, data: Path, values: Mapping[str, str], progress: Progre
     }
     run.series = {
         "columns": {
-            s.name: {"kind": s.kind, "unit": s.unit, **_rounding(s, reader.beginning[s.name], reader.steps)}
+            s.name: {
+                "kind": s.kind,
+                "unit": s.unit,
+                **_rounding(s, reader.beginning[s.name], reader.steps),
+                "alike": reader.equal.share(s.name) if s.kind in drift_columns.DIRECT else 0.0,
+            }
             for s in signals
         },
         "others": reader.others,

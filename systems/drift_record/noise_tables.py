@@ -62,6 +62,11 @@ def _disagreement(noise: NoiseModel) -> str:
             f"the changes between rows vanish and come back after {number(noise.slower)} rows, values of a slower "
             "record that were held or interpolated"
         )
+    if noise.rounded_away:
+        return (
+            f"{_percent(noise.alike)} of the samples are the same as the one before: the noise is below the step of "
+            "the values, and where they change tells where the step is"
+        )
     a = min(noise.agreements, key=lambda a: a.share)
     if a.holds:
         return (

@@ -141,10 +141,13 @@ def columns_of(record: Record) -> Columns:
     return Columns(grid, {"drift": rate}, others, run.window_units, step, said)
 
 
-def prepare(name: str, columns: Columns, remove_lines: bool, means: bool = True, wild: bool = True) -> Prepared:
+def prepare(
+    name: str, columns: Columns, remove_lines: bool, means: bool = True, wild: bool = True, alike: float = 0.0
+) -> Prepared:
     """Return a rate with its noise model and what other columns, lines and steps explain taken out.
 
-    means: a sample is the mean over the step.  wild: samples are looked for that are none of the noise.
+    means: a sample is the mean over the step.  wild: samples are looked for that are none of the noise.  alike: share
+    of the samples that are as they were read and equal the one before.
     Raises ReductionError for a record too short or without a stretch long enough.
     """
     rate = columns.rates[name]
@@ -162,7 +165,7 @@ def prepare(name: str, columns: Columns, remove_lines: bool, means: bool = True,
     there = np.isfinite(rate)
     share = float(np.var(taken[there]) / (np.var(rate[there]) or 1.0)) if regressions else None
     try:
-        noise = fit_noise(left, columns.step, means, remove_lines, wild, rate)
+        noise = replace(fit_noise(left, columns.step, means, remove_lines, wild, rate), alike=alike)
         model = describe(noise.longest[1], columns.step)
     except SeriesError as error:
         raise ReductionError([f"column '{name}': {error}"]) from None

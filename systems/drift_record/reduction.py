@@ -137,7 +137,9 @@ def analyse(name: str, columns: Columns, run: RunDocument) -> Analysed:
     series = run.series or {}
     about: Mapping[str, Any] = series["columns"][name] if series else {"kind": "", "white": True}
     points = about["kind"] in DIRECT and series.get("samples") == "points" and series["factor"] == 1
-    p = prepare(name, columns, bool(run.options.get("remove_lines", True)), not points, about["white"])
+    p = prepare(
+        name, columns, bool(run.options.get("remove_lines", True)), not points, about["white"], about.get("alike", 0.0)
+    )
     held = deviations(p.clean, p.step, tuple(KINDS))
     every = {
         kind: Deviation("", **{n: np.asarray(d[n]) for n in FIELDS})

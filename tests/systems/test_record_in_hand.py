@@ -1,4 +1,4 @@
-"""A drift record with the moments in which the instrument was put down and taken up."""
+"""Drift records as they come from a telephone: the moments in which it was put down and taken up, values in steps."""
 
 from __future__ import annotations
 
@@ -44,3 +44,20 @@ def test_correlated_gyros_that_were_moved_in_chinese(tmp_path: Path) -> None:
     assert any(t.id == "correlations" for t in result.tables)
     write(result, tmp_path / "out", language="zh")  # a sentence without its Chinese is an error
     assert "并非静止" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("no_arma")
+@pytest.mark.parametrize(("level", "stated"), [(0.35, False), (0.5, True)])
+def test_noise_far_below_the_step_of_the_values(level: float, stated: bool, tmp_path: Path) -> None:
+    """Noise of 0.07 steps, 0.15 below the place where the value changes: P(z > 2.14) = 0.016, 0.968 of the samples are
+    as the one before, and nothing is stated.  At that place every second one is, and the coefficients have a doubt."""
+    rng = np.random.default_rng(7)
+    values = np.rint(level + 0.07 * rng.normal(size=6000)).astype(int)
+    file = tmp_path / "record.csv"
+    file.write_text("force_x [mg]\n" + "\n".join(map(str, values)) + "\n")
+    system = load_system("drift_record")
+    result = system.reduce(system.read_measured(file, {"type_b": "none", "sampling": "5Hz"}))
+    assert np.isfinite(result["N"].estimate) == stated
+    assert ("drift_record.misfit" in {r.id for r in result.reasons}) != stated
+    assert "drift_record.coarse" in {r.id for r in result.reasons if r.severity == "doubt"}
+    assert stated or "96." in result["N"].no_value

@@ -59,6 +59,9 @@ class Minimum:
     reached: bool
 
 
+ALIKE = 0.9  # share of samples equal to the one before, from which on the others are told by the place of the step
+
+
 @dataclass(frozen=True)
 class Scale:
     """Units of a fit: interval tau0 of a sample, s, size and level of the rate; means: samples are means over tau0."""
@@ -97,7 +100,8 @@ class NoiseModel:
     parameters in units of ``scale``, as the treatment is.  agreements: with the record as it was, and without what was
     taken out.  with_wild: coefficients with the wild samples left in.  models: how many were compared.
     chances: filtered, that the white noise has passed a filter; steep, of so steep a fall of the slow drift, weak, of
-    so little of the slowest noise by chance, see :mod:`gyrobench.reduction.noise_model.one_curve`.
+    so little of the slowest noise by chance, see :mod:`gyrobench.reduction.noise_model.one_curve`.  alike: share of the
+    samples that are as they were read and equal the one before.
     """
 
     scale: Scale
@@ -110,6 +114,7 @@ class NoiseModel:
     with_wild: dict[str, float]
     models: int
     chances: dict[str, float]
+    alike: float = 0.0
 
     def __getitem__(self, name: str) -> Estimate:
         """Return a coefficient."""
@@ -135,9 +140,15 @@ class NoiseModel:
     @property
     def agrees(self) -> bool:
         """Return whether the deviation that the model implies is the record's, as it was and as it was cleaned, what
-        stands for missing and wild samples came to an end, and no rows are those of a slower record.
+        stands for missing and wild samples came to an end, no rows are those of a slower record, and the noise is more
+        than a rare change between two values.
         """
-        return all(a.holds for a in self.agreements) and self.treatment.settled and not self.slower
+        settled = self.treatment.settled and not self.slower and not self.rounded_away
+        return settled and all(a.holds for a in self.agreements)
+
+    @property
+    def rounded_away(self) -> bool:
+        return self.alike > ALIKE
 
     @cached_property
     def over_time(self) -> tuple[TermOverTime, ...]:
