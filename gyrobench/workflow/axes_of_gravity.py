@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from gyrobench.record.column_proposal import FileColumn
 
 GRAVITY = {"m/s2": 9.81, "g": 1.0, "mg": 1000.0}
+EXACT = 1e-3  # of the squares of a quaternion from 1
 NEAR = 0.15  # a bias of a poor accelerometer, of g
 
 
@@ -22,8 +23,11 @@ def triads(columns: Sequence[FileColumn]) -> tuple[list[FileColumn], list[FileCo
     """Return the first three columns side by side that are axes of one name, or have none, and read gravity, and three
     others if there are just three; [].
     """
+    fours = [columns[k : k + 4] for k in range(len(columns) - 3)]
+    quaternions = {c.sources for q in fours if abs(sum(c.level**2 for c in q) - 1.0) < EXACT for c in q}
     threes = [list(columns[k : k + 3]) for k in range(len(columns) - 2)]
-    forces = next((t for t in threes if unit_of(t) and len({_stem(c) for c in t}) == 1), [])
+    alike = [t for t in threes if len({_stem(c) for c in t}) == 1 and not quaternions & {c.sources for c in t}]
+    forces = next((t for t in alike if unit_of(t) in ("m/s2", "g")), [])  # a thousand may be anything
     rates = [c for c in columns if c not in forces]
     return forces, rates if forces and len(rates) == 3 else []
 

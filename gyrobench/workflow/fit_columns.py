@@ -38,10 +38,10 @@ COUNTS = "counts"  # of columns that are called as the angle or velocity of each
 FOUND = (COUNTS, "attitudes")  # what the columns tell
 KINDS = ("rad/s", "rad", "m/s2", "K")  # of the columns of a drift record, which has any names
 #: what columns without a unit are called -> unit that may be meant
-OTHER = r"(?!.*(time|stamp|_dt\b|count|clip|_id\b|status))"  # what belongs to a rate or force and is none
+OTHER = r"(?!.*(time|stamp|_dt\b|count|clip|covariance|_id\b|status))"  # what belongs to a rate or force and is none
 LIKELY = {
-    OTHER + r"(([xyz]_)?gyr.*|omega.*|[gw]_?[xyz]|(dreh)?rat.*)": "deg/s",
-    OTHER + r"(([xyz]_)?acc.*|beschl.*|[af]_?[xyz])": "m/s2",
+    OTHER + r"((\w+_)?gyr.*|omega.*|[gw]_?[xyz]|(dreh)?rat.*)": "deg/s",
+    OTHER + r"((\w+_)?acc.*|beschl.*|[af]_?[xyz])": "m/s2",
     r".*temp.*": "degC",
 }
 

@@ -58,3 +58,16 @@ def test_a_field_of_one_is_no_gravity(tmp_path: Path) -> None:
     head = "wx,wy,wz,mx,my,mz,qx,qy,qz,qw,tx,ty,tz"
     found = proposed(tmp_path, "x.csv", head, rows(0, 0, 0, 0.6, 0.8, 0, 0, 0, 0, 1, 0.1, 0.1, 9.9), "imu_positions")
     assert found["ax"] == "m/s2"
+
+
+def test_a_quaternion_without_names_is_no_gravity(tmp_path: Path) -> None:
+    """A time and (1, 0, 0, 0), beside lengths of meters."""
+    lines = [f"{k},1,0.0000{k % 3},0,0,0.85,{k % 7},1.17" for k in range(30)]
+    assert "acc_x" not in proposed(tmp_path, "x.csv", "", lines)
+
+
+def test_a_word_before_the_quantity(tmp_path: Path) -> None:
+    found = proposed(
+        tmp_path, "x.csv", "imu_gyr_1,imu_gyr_2,imu_gyr_3,imu_acc_1,imu_acc_2,imu_acc_3", rows(0, 0, 0, 0, 0, 1)
+    )
+    assert list(found.values()) == ["deg/s"] * 3 + ["g"] * 3
