@@ -330,12 +330,12 @@ def of_motion(columns: Columns) -> list[Reason]:
     if columns.moved is None:
         return []
     edges = np.flatnonzero(np.diff(columns.moved.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    spans = [f"{number(columns.step * a)} to {number(columns.step * b)} s" for a, b in edges[:MOTIONS].tolist()]
-    more = f" and {len(edges) - MOTIONS} times more" if len(edges) > MOTIONS else ""
+    spans = [f"{number(columns.step * a)}–{number(columns.step * b)} s" for a, b in edges[:MOTIONS].tolist()]
+    more = ", …" if len(edges) > MOTIONS else ""
     return [
         Reason(
             "drift_record.moved",
-            f"The instrument was not at rest from {', '.join(spans)}{more}: its readings move by {TIMES:g} times their "
+            f"The instrument was not at rest at {', '.join(spans)}{more}: its readings move by {TIMES:g} times their "
             f"noise and more. {number(columns.step * columns.moved.sum())} s are left out.",
         )
     ]

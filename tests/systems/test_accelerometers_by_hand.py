@@ -81,6 +81,8 @@ def test_scale_factors_of_counts_in_chinese(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).normal(size=(26, 3))
     record = read(tmp_path, 16384.0 * readings() + noise, unit="")
     write(load_system("imu_positions").reduce(record), tmp_path / "out", language="zh")
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "计数" in page and "是否计入" not in page  # the unit, not whether something counts
 
 
 def test_many_rows_without_a_time_are_samples(tmp_path: Path) -> None:
