@@ -27,6 +27,7 @@ from gyrobench.record.row_faults import NOTHING
 from gyrobench.record.text_cells import BINARY, cells_of_file, without_mark
 
 SAMPLE = 1 << 22  # bytes that are looked at
+FEW_KINDS = 6  # of rows that are told by a word
 IN_TURN = 20  # rows of another width that are no head of a file
 FIRST = 200  # numbers of a column: it is put into other positions later
 LONG = 2000  # rows from which on a file is taken for time series
@@ -194,12 +195,24 @@ def find_layout(file: Path) -> FileLayout:
             )
         names = []  # a title, or nothing
     rows = [c for c in lines[start:] if len(c) == width]
+    if kinds := _kinds([r[0] for r in rows]):
+        raise UsageError(
+            f"{file}: rows of several kinds in turn ({', '.join(kinds)}): write what belongs together in one row, or "
+            "each kind into a file of its own"
+        )
     comma = delimiter != "," and any(DECIMAL_COMMA.fullmatch(c) for r in rows for c in r)
     numbered = len(names) != width
     columns = _columns(names[:width] or [""] * width, lines[of_units] if of_units >= 0 else [], rows, numbered)
     skip, below = (start, 0) if numbered else (at, start - at - 1)
     decimal = "," if comma else "."
     return FileLayout(encoding, delimiter, decimal, skip, below, len(rows), columns, not numbered)
+
+
+def _kinds(words: Sequence[str]) -> list[str]:
+    """Return the words of a first column that says of which of some kinds each row is; [] of any other column."""
+    kinds = Counter(words)
+    turns = sum(a != b for a, b in pairwise(words))
+    return sorted(kinds) if len(kinds) <= FEW_KINDS and 3 * turns > len(words) > 9 and not _share([*kinds]) else []
 
 
 def _first_row(good: Sequence[int], lines: Sequence[Sequence[str]]) -> int:

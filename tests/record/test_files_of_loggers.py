@@ -149,6 +149,14 @@ def test_lines_of_two_kinds_in_turn(tmp_path: Path) -> None:
     assert find_layout(tmp_path / "log.txt").rows == 9
 
 
+def test_rows_that_a_word_tells_apart(tmp_path: Path) -> None:
+    """A gyro and an accelerometer in turn, their word before the numbers, as a microcontroller prints them."""
+    rows = "".join(f"acc {k} 0.1 {k % 3} 0.9\ngyro {k} 3.1 {k % 5} 0.2\n" for k in range(20))
+    (tmp_path / "log.txt").write_text(rows, encoding="utf-8")
+    with pytest.raises(UsageError, match=r"rows of several kinds in turn \(acc, gyro\)"):
+        find_layout(tmp_path / "log.txt")
+
+
 def test_a_word_before_the_time_of_rows_without_names(tmp_path: Path) -> None:
     """The first column of numbers that rises is the time; one that rises behind another is not."""
     rows = "".join(f"gyro {2061 + 11 * k} 0.{k % 7} {k} 1.5\n" for k in range(40))
