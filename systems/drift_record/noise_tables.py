@@ -11,6 +11,7 @@ from gyrobench.reduction.noise_model.agreement import ENOUGH
 from gyrobench.reduction.noise_model.constancy import changing
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.channel_units import ChannelUnits
+from gyrobench.reduction.series.motion import TIMES
 from gyrobench.reduction.series.noise_coefficients import Estimate
 from gyrobench.reduction.toolkit import Array, Table, plain
 from gyrobench.report.numbers import write_number, write_p
@@ -61,6 +62,11 @@ def _disagreement(noise: NoiseModel) -> str:
         return (
             f"the changes between rows vanish and come back after {number(noise.slower)} rows, values of a slower "
             "record that were held or interpolated"
+        )
+    if noise.restless:
+        return (
+            f"in {_percent(noise.restless)} of the record the readings move by {TIMES:g} times the noise of the rest "
+            "and more: the instrument was not at rest, or its noise is not one"
         )
     if noise.rounded_away:
         return (

@@ -18,7 +18,7 @@ from gyrobench.reduction.series.channel_units import FORCE, RATE, ChannelUnits, 
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.lines import Lines
-from gyrobench.reduction.series.motion import moved
+from gyrobench.reduction.series.motion import MOST, moved
 from gyrobench.reduction.series.row_pattern import RowPattern, every_second_row
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.toolkit import Array, Record, ReductionError, attitude_of, plain
@@ -97,6 +97,7 @@ class Columns:
     units: dict[str, ChannelUnits] = field(default_factory=dict)  # of the channels that are no rate
     inseparable: list[str] = field(default_factory=list)  # rates of change that follow their columns
     moved: NDArray[np.bool_] | None = None  # samples in which the instrument was moved, left out; None: none
+    restless: float = 0.0  # share of the record in which it was moved, where that is too much to leave out
 
 
 def columns_of(record: Record) -> Columns:
@@ -110,11 +111,12 @@ def columns_of(record: Record) -> Columns:
         units = {n: units_of(run.window_units.get(n, "")) for n in rates}
         others, named, left = with_rates_of_change(others, run.window_units, step)
         found = moved(rates, step)
-        if found.any():
+        restless = float(found.mean())
+        if cut := 0.0 < restless <= MOST:
             rates = {n: np.where(found, np.nan, v) for n, v in rates.items()}
         return Columns(
             start - start[0], rates, others, named, step, units=units, inseparable=left,
-            moved=found if found.any() else None,
+            moved=found if cut else None, restless=0.0 if cut else restless,
         )  # fmt: skip
     if "mean" not in w or len(w["mean"]) < LEAST:
         raise ReductionError([f"{len(w.get('mean', ()))} windows: a drift record needs at least {LEAST}"])
@@ -165,7 +167,8 @@ def prepare(
     there = np.isfinite(rate)
     share = float(np.var(taken[there]) / (np.var(rate[there]) or 1.0)) if regressions else None
     try:
-        noise = replace(fit_noise(left, columns.step, means, remove_lines, wild, rate), alike=alike)
+        noise = fit_noise(left, columns.step, means, remove_lines, wild, rate)
+        noise = replace(noise, alike=alike, restless=columns.restless)
         model = describe(noise.longest[1], columns.step)
     except SeriesError as error:
         raise ReductionError([f"column '{name}': {error}"]) from None

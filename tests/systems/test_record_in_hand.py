@@ -62,3 +62,19 @@ def test_noise_far_below_the_step_of_the_values(level: float, stated: bool, tmp_
     assert ("drift_record.misfit" in {r.id for r in result.reasons}) != stated
     assert "drift_record.coarse" in {r.id for r in result.reasons if r.severity == "doubt"}
     assert stated or "96." in result["N"].no_value
+
+
+@pytest.mark.usefixtures("no_arma")
+def test_positions_by_hand_are_no_record_at_rest(tmp_path: Path) -> None:
+    """Level for 6 s, turned by half a turn in 3 s, and so on: K of it was stated."""
+    rng = np.random.default_rng(8)
+    angle = np.repeat(np.arange(8) % 2, 900).astype(float)
+    for k in range(1, 8):
+        angle[900 * k - 300 : 900 * k] = 0.5 - 0.5 * np.cos(np.pi * (np.arange(300) / 300 + (k - 1) % 2))
+    force = np.cos(np.pi * angle) + 1e-3 * rng.normal(size=angle.size)
+    file = tmp_path / "record.csv"
+    file.write_text("force_x [g]\n" + "\n".join(f"{v:.6f}" for v in force) + "\n")
+    system = load_system("drift_record")
+    result = system.reduce(system.read_measured(file, {"type_b": "none", "sampling": "100Hz"}))
+    assert not any(np.isfinite(c.estimate) for c in result.coefficients)
+    assert "was not at rest" in result["N"].no_value

@@ -101,7 +101,7 @@ class NoiseModel:
     taken out.  with_wild: coefficients with the wild samples left in.  models: how many were compared.
     chances: filtered, that the white noise has passed a filter; steep, of so steep a fall of the slow drift, weak, of
     so little of the slowest noise by chance, see :mod:`gyrobench.reduction.noise_model.one_curve`.  alike: share of the
-    samples that are as they were read and equal the one before.
+    samples that are as they were read and equal the one before.  restless: share of the record that is none at rest.
     """
 
     scale: Scale
@@ -115,6 +115,7 @@ class NoiseModel:
     models: int
     chances: dict[str, float]
     alike: float = 0.0
+    restless: float = 0.0
 
     def __getitem__(self, name: str) -> Estimate:
         """Return a coefficient."""
@@ -140,10 +141,10 @@ class NoiseModel:
     @property
     def agrees(self) -> bool:
         """Return whether the deviation that the model implies is the record's, as it was and as it was cleaned, what
-        stands for missing and wild samples came to an end, no rows are those of a slower record, and the noise is more
-        than a rare change between two values.
+        stands for missing and wild samples came to an end, no rows are those of a slower record, the noise is more than
+        a rare change between two values, and it was at rest.
         """
-        settled = self.treatment.settled and not self.slower and not self.rounded_away
+        settled = self.treatment.settled and not (self.slower or self.rounded_away or self.restless)
         return settled and all(a.holds for a in self.agreements)
 
     @property

@@ -2,8 +2,8 @@
 
 A block of samples is compared with the others by the median size of its differences of samples LAG apart, less their
 median: a step of the level, single wild samples and a steady slope leave it as it is.  Where it is TIMES that of most
-blocks in any channel, the block and its neighbors are no noise of the instrument.  Where they are many, the noise
-changes, and nothing is left out.  [DRIFT-NOISE-MODEL]
+blocks in any channel, the block and its neighbors are no noise of the instrument.  More than MOST of a record is not
+for leaving out: it is no record at rest, or one whose noise changes.  [DRIFT-NOISE-MODEL]
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from gyrobench.arrays import Array
 BLOCK, LAG = 32, 8  # samples
 SECONDS = 0.5  # of a block at least: a hand moves at some hertz
 TIMES = 8.0  # of 10⁴ blocks of a random walk, which differ most, the largest is 4
-MOST = 0.2  # of the record
+MOST = 0.2  # of a record, that may be left out
 FEW = 10  # blocks of an end that was cut off by a motion
 
 
@@ -44,8 +44,6 @@ def moved(channels: Mapping[str, Array] | Sequence[Array], step: float) -> NDArr
     for run in (runs[0], runs[-1]):
         if free.size and run.size < FEW and (run[0] == 0 or run[-1] == blocks - 1):
             found[run] = True
-    if found.mean() > MOST:
-        return out
     out[: blocks * size] = np.repeat(found, size)
     out[blocks * size :] = found[-1]
     return out
