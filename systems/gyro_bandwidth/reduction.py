@@ -15,7 +15,7 @@ import numpy as np
 from gyrobench.reduction.loops.curve_misfit import LEAST, alike
 from gyrobench.reduction.loops.loop_curves import bode, curve
 from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table, told
-from gyrobench.reduction.loops.response_errors import GAIN_SLOPE, Sensitivity, not_stated, predicted_shifts
+from gyrobench.reduction.loops.response_errors import GAIN_SLOPE, Sensitivity, left_out, not_stated, predicted_shifts
 from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG, TIME_BASE, Source
 from gyrobench.reduction.toolkit import Reason, plain
 from gyrobench.units import DEG
@@ -79,7 +79,7 @@ class Reduction(MeasureReduction):
             said = ["Bandwidth (−3 dB) {f_3dB}, equivalent order {order}.", *said]
         if math.isfinite(self.figures.value[2]):
             said.append("The gyro lags by 90° at {f_90}.")
-        return told(self.found.coefficients, *said)
+        return [*told(self.found.coefficients, *said), *left_out(self.found.reasons)]
 
     # ------------------------------------------------------------------ figures and their budget
     def _report(self) -> None:

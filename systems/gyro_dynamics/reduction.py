@@ -18,7 +18,7 @@ from gyrobench.reduction.loops.curve_misfit import LEAST, alike
 from gyrobench.reduction.loops.loop_curves import bode, curve, trace
 from gyrobench.reduction.loops.loop_reduction import MeasureReduction
 from gyrobench.reduction.loops.loop_toolkit import ARCMIN, Account, Array, Point, ReductionError, Table, told
-from gyrobench.reduction.loops.response_errors import Sensitivity, not_stated, predicted_shifts
+from gyrobench.reduction.loops.response_errors import Sensitivity, left_out, not_stated, predicted_shifts
 from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG, TIME_BASE, Source
 
 from .mistakes import mistakes
@@ -102,7 +102,7 @@ class Reduction(MeasureReduction):
             said.append("From steps {tau_step}.")
         if "f_3dB" in names:
             said.append("The gain is 3 dB down at {f_3dB}.")
-        return told(self.found.coefficients, *said)
+        return [*told(self.found.coefficients, *said), *left_out(self.found.reasons)]
 
     # ------------------------------------------------------------------ sines
     def _sines(self, r: AngleResponse) -> None:

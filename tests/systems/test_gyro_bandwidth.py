@@ -221,11 +221,14 @@ def test_a_measured_file(tmp_path: Path) -> None:
         assert c["order"].estimate == pytest.approx(2.0, abs=0.02)
 
 
-@pytest.mark.long
 def test_nothing_stated_nothing_passes(tmp_path: Path) -> None:
-    ids = [r.id for r in measured(tmp_path, rows_of(), "").reasons]
-    assert "type_b.unstated" in ids
-    assert "type_b.unstated" not in [r.id for r in measured(tmp_path, rows_of(), "# u_gain = 1e-3").reasons]
+    """Each figure needs what moves it: K the gain of the reading of the table, f_90 and the delay its lag."""
+    gain, lag, left_out = "# u_gain = 1e-3", "# u_lag = 1e-5s", {"gain": ("K",), "lag": ("f_90", "delay")}
+    for said in ("", gain, lag, f"{gain}\n{lag}", "# type_b = none"):
+        result = measured(tmp_path, rows_of(), said)
+        names = [left_out[n] for n in left_out if f"u_{n}" not in said and "type_b" not in said]
+        reasons = [r for r in result.reasons if r.id == "type_b.unstated" and r.blocks == ("pass", "fail")]
+        assert [r.names for r in reasons] == names and all(r.text in result.summary for r in reasons)
 
 
 @pytest.mark.long

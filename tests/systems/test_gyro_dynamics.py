@@ -195,8 +195,11 @@ def test_a_file_of_steps(tmp_path: Path) -> None:
 
 
 def test_nothing_stated_nothing_passes(tmp_path: Path) -> None:
-    ids = [r.id for r in measured(tmp_path, SINES, sines(), "note = x").reasons]
-    assert {"type_b.unstated", "arrangement.unstated"} <= set(ids)
+    """The gain of the reading moves g, its lag tau."""
+    result = measured(tmp_path, SINES, sines(), "note = x")
+    assert {"type_b.unstated", "arrangement.unstated"} <= {r.id for r in result.reasons}
+    gain, lag = (r for r in result.reasons if r.id == "type_b.unstated" and r.names)
+    assert "g" in gain.names and "tau" in lag.names and {gain.text, lag.text} <= set(result.summary)
 
 
 @pytest.mark.parametrize(

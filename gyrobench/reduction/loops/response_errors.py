@@ -37,6 +37,12 @@ WRONG = {
     READING_LAG.id: ("a reading late by 1 ms (a sample too much)", 1e-3),
     GAIN_SLOPE.id: ("an amplitude wrong by 2 % at the highest frequency", 0.02),
 }
+#: what the intervals of figures leave out where nothing is stated of it
+LEFT_OUT = {
+    READING_GAIN.id: "The intervals of {} include no gain error of the table reading, which no residual shows: "
+    "state u_gain.",
+    READING_LAG.id: "The intervals of {} include no lag of the table reading, which no residual shows: state u_lag.",
+}
 BEND = 3  # degree in ln f of the logarithm of the noise, which is smooth
 ROOT_POWER = math.exp(0.5 * (math.log(LINES / 2.0) - float(special.psi(LINES / 2.0))))  # 1 over exp(mean ln s)
 
@@ -130,30 +136,40 @@ def predicted_shifts(
 def not_stated(
     run: RunDocument, by: Sequence[Sensitivity], figures: Sequence[tuple[int, str, str, float, float]]
 ) -> Iterator[Reason]:
-    """Yield what a measured record does not state though no residual shows it: uncertainties of table and reading, and
-    that units and scales were checked (see gyrobench.reduction.diagnosis.unshown).
+    """Yield what a measured record does not state though no residual shows it: gain and lag of the reading, of each
+    figure that they move, and that units and scales were checked (see gyrobench.reduction.diagnosis.unshown).
 
     figures: as of :func:`predicted_shifts`; none where the record has no sines.
     """
     if not run.measured:
         return
-    if run.type_b != "none" and not any(s.u > 0.0 for s in by):
-        text = (
-            "No uncertainty of the table or its reading is stated: u is of the points alone. State u_gain, u_lag ..., "
-            "or declare type_b = none."
-        )
-        yield Reason(TYPE_B_UNSTATED, text, ("pass", "fail"), severity="doubt")
+    unknown = {
+        s.source.id: {
+            name: WRONG[s.source.id][1] * abs(float(np.nan_to_num(s.change[k]))) / u
+            for k, name, _, _, u in figures
+            if u > 0.0
+        }
+        for s in by
+        if s.source.id in WRONG and s.u == 0.0
+    }
+    for id, text in LEFT_OUT.items():
+        names = tuple(n for n, v in unknown.get(id, {}).items() if v > 1.0)
+        if names and run.type_b != "none":
+            yield Reason(TYPE_B_UNSTATED, text.format(", ".join(names)), ("pass", "fail"), names, severity="doubt")
     if run.arrangement == "checked":
         return
     said = ["frequencies in rad/s given as Hz (6.28 times)"] if figures else [WRONG[TIME_BASE.id][0]]
-    for s in (s for s in by if s.source.id in WRONG and s.u == 0.0):
-        words, size = WRONG[s.source.id]
-        moved = {name: size * abs(float(np.nan_to_num(s.change[k]))) / u for k, name, _, _, u in figures if u > 0.0}
+    for id, moved in unknown.items():
         far = sorted((n for n, v in moved.items() if v > 1.0), key=lambda n: -moved[n])[:3]
         if far:
-            said.append(f"{words} ({', '.join(f'{n} by {plain(moved[n])} u' for n in far)})")
+            said.append(f"{WRONG[id][0]} ({', '.join(f'{n} by {plain(moved[n])} u' for n in far)})")
     text = (
         f"No residual of this record would show: {'; '.join(said)}. State that units and scales were checked "
         "(arrangement = checked)."
     )
     yield Reason(ARRANGEMENT, text, ("pass",), severity="doubt")
+
+
+def left_out(reasons: Sequence[Reason]) -> list[str]:
+    """Return what the intervals leave out, as sentences of the summary: it is to stand beside the figures."""
+    return [r.text for r in reasons if r.id == TYPE_B_UNSTATED]
