@@ -38,10 +38,10 @@ class NumberType:
         return f"a value that {self.name} does not hold ({self.lowest} to {self.highest})"
 
 
-def _whole(name: str, ctype: Any, bits: int, signed: bool, call: str = "") -> NumberType:
+def _whole(name: str, ctype: Any, bits: int, signed: bool) -> NumberType:
     bits = min(bits, WHOLE_BITS + signed)
     lowest = -(2 ** (bits - 1)) if signed else 0
-    return NumberType(name, call or name, ctype, lowest, 2 ** (bits - signed) - 1)
+    return NumberType(name, name, ctype, lowest, 2 ** (bits - signed) - 1)
 
 
 #: the types of FMI 2.0 and, from Float64 on, those of FMI 3.0; the places in this list are the codes of engine.c

@@ -56,9 +56,9 @@ def _content(cls: type[Component], name: str, target: str, fmi: int) -> str:
     return content_hash(*texts, _tool_hash(), target, str(fmi), name, *beside)
 
 
-def native_guid(name: str, cls: type[Component], fmi: int = 2) -> str:
-    """Return the GUID of the native FMU that a build of this part makes now."""
-    return guid_of(_content(cls, name, "native", fmi))
+def native_guid(name: str, cls: type[Component]) -> str:
+    """Return the GUID of the native FMU (FMI 2.0) that a build of this part makes now."""
+    return guid_of(_content(cls, name, "native", 2))
 
 
 def write_archive(path: Path, entries: dict[str, bytes], durable: bool = True) -> None:

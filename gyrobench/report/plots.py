@@ -58,11 +58,12 @@ def by_axis(series: Sequence[Series]) -> list[list[Series]]:
     return sorted(groups.values(), key=lambda alike: -sum(len(s.x) for s in alike))
 
 
-def limits(values: Sequence[float], pad: float = 0.08) -> tuple[float, float] | None:
+def limits(values: Sequence[float]) -> tuple[float, float] | None:
     low, high = (min(values), max(values)) if values else (0.0, 0.0)
     if not values or low == high:
         return None
-    return low - pad * (high - low), high + pad * (high - low)
+    pad = 0.08 * (high - low)
+    return low - pad, high + pad
 
 
 def fit(series: Sequence[Series], key: str, alike: Sequence[Series], everything: Sequence[Series]) -> str:

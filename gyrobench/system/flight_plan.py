@@ -41,15 +41,15 @@ def phases(legs: Sequence[Leg]) -> list[LoopPhase]:
     return [LoopPhase(leg.label, settle=leg.rest, dwell=leg.time) for leg in legs]
 
 
-def parameters(legs: Sequence[Leg], plan: Sequence[LoopPhase], slot: str = "motion") -> dict[str, float]:
-    """The parameters of the manoeuvre in ``slot``: each leg is flown in the phase of a plan that has its label.
+def parameters(legs: Sequence[Leg], plan: Sequence[LoopPhase]) -> dict[str, float]:
+    """The parameters of the manoeuvre in the slot motion: each leg is flown in the phase of a plan that has its label.
 
     A leg that the plan does not have is not flown: a plan of other phases moves the base in none of them.  They are set
     where the part has them ("?"): another part may move the base.
     """
     flown = {leg.label: leg for leg in legs}
     return {
-        f"{slot}.{name}[{k}]?": float(getattr(flown[phase.label], name))
+        f"motion.{name}[{k}]?": float(getattr(flown[phase.label], name))
         for k, phase in enumerate(plan, 1)
         if phase.label in flown
         for name in RATES

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,9 +33,9 @@ from gyrobench.tuning.tuned_loop import ALLOWED, LoopTuning, measured_text, rang
 NAMES = {kind: f"tuning.{kind}" for kind in FORMATS}
 
 
-def write_tuning(tuned: LoopTuning, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Path]:
+def write_tuning(tuned: LoopTuning, folder: Path) -> dict[str, Path]:
     """Write tuning.json, tuning.html, tuning.pdf into a folder; as :func:`gyrobench.report.report_files.write`."""
-    return write_files(tuned.as_dict(), lambda: page(tuned), folder, formats, NAMES, Bench.find().folder)
+    return write_files(tuned.as_dict(), lambda: page(tuned), folder, FORMATS, NAMES, Bench.find().folder)
 
 
 def page(t: LoopTuning) -> Page:

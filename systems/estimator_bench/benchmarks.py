@@ -46,8 +46,9 @@ def linear(A: Matrix, W: Matrix, R: float) -> dict[str, float]:
     return elements
 
 
-def sloped(q: float, T: float = 1e-3) -> dict[str, float]:
+def sloped(q: float) -> dict[str, float]:
     """Return value and slope, the slope driven by white noise of density q."""
+    T = 1e-3
     W = [[q * T**3 / 3.0, q * T**2 / 2.0], [q * T**2 / 2.0, q * T]]
     return linear([[1.0, T], [0.0, 1.0]], W, SIGMA**2)
 

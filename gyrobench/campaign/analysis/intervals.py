@@ -53,45 +53,43 @@ class ToleranceInterval:
 
 
 @cache
-def normal_factor(n: int, content: float = CONTENT, confidence: float = CONFIDENCE) -> float:
+def normal_factor(n: int) -> float:
     """Return the exact k of the two-sided interval mean ± k s of n normal values.
 
-    With z = the error of the mean in units of sigma and r(z) the half-width around it that holds ``content``, k solves
-    E_z[P(chi2_(n-1) > (n-1) r(z)² / k²)] = confidence  (ISO 16269, part 6).
+    With z = the error of the mean in units of sigma and r(z) the half-width around it that holds CONTENT, k solves
+    E_z[P(chi2_(n-1) > (n-1) r(z)² / k²)] = CONFIDENCE  (ISO 16269, part 6).
     """
     nodes, weights = np.polynomial.hermite_e.hermegauss(60)
     shift = np.abs(nodes) / np.sqrt(n)
-    half = np.array([_half_width(z, content) for z in shift])
+    half = np.array([_half_width(z) for z in shift])
     dof = n - 1
 
     def excess(k: float) -> float:
-        return float(weights @ special.chdtrc(dof, dof * half**2 / k**2)) / float(weights.sum()) - confidence
+        return float(weights @ special.chdtrc(dof, dof * half**2 / k**2)) / float(weights.sum()) - CONFIDENCE
 
     # the chi-square of one or two degrees of freedom makes k large
     return float(optimize.brentq(excess, 0.1, 1e4, xtol=1e-10))
 
 
-def _half_width(shift: float, content: float) -> float:
-    """Return r where a normal of mean ``shift`` has ``content`` inside ± r."""
+def _half_width(shift: float) -> float:
+    """Return r where a normal of mean ``shift`` has CONTENT inside ± r."""
     return float(
-        optimize.brentq(lambda r: special.ndtr(r - shift) - special.ndtr(-r - shift) - content, 0.0, shift + 40.0)
+        optimize.brentq(lambda r: special.ndtr(r - shift) - special.ndtr(-r - shift) - CONTENT, 0.0, shift + 40.0)
     )
 
 
-def order_trim(n: int, content: float = CONTENT, confidence: float = CONFIDENCE) -> int:
+def order_trim(n: int) -> int:
     """Return how many of the n values may lie outside, below and above together; -1 where n is too small.
 
-    The interval from the r-th smallest to the s-th largest value holds ``content`` with the probability
-    P(Binomial(n, content) <= n - r - s), whatever the distribution.
+    The interval from the r-th smallest to the s-th largest value holds CONTENT with the probability
+    P(Binomial(n, CONTENT) <= n - r - s), whatever the distribution.
     """
     outside = np.arange(2, n + 1)  # r + s: at least the smallest and the largest value are the ends
-    enough = outside[stats.binom.cdf(n - outside, n, content) >= confidence]
+    enough = outside[stats.binom.cdf(n - outside, n, CONTENT) >= CONFIDENCE]
     return int(enough[-1]) - 2 if len(enough) else -1
 
 
-def tolerance_interval(
-    values: Array, content: float = CONTENT, confidence: float = CONFIDENCE, kind: str | None = None
-) -> ToleranceInterval:
+def tolerance_interval(values: Array, kind: str | None = None) -> ToleranceInterval:
     """Return the two-sided tolerance interval: normal where the Shapiro-Wilk test does not object.
 
     Else distribution-free, from order statistics; 95 % with 95 % confidence take 93 values.  kind: one of the two,
@@ -103,15 +101,15 @@ def tolerance_interval(
     x = x[np.isfinite(x)]
     n = len(x)
     if n < 3:
-        return ToleranceInterval(None, None, kind or "normal", n, None, content, confidence)
+        return ToleranceInterval(None, None, kind or "normal", n, None)
     p = None if n < 8 or x[0] == x[-1] else float(stats.shapiro(x[:: max(1, n // 5000)]).pvalue)
     chosen = kind or ("normal" if p is None or p >= NORMALITY else "distribution-free")
     if chosen == "normal":
-        half = normal_factor(n, content, confidence) * float(x.std(ddof=1))
+        half = normal_factor(n) * float(x.std(ddof=1))
         mean = float(x.mean())
-        return ToleranceInterval(mean - half, mean + half, chosen, n, p, content, confidence)
-    outside = order_trim(n, content, confidence)
+        return ToleranceInterval(mean - half, mean + half, chosen, n, p)
+    outside = order_trim(n)
     if outside < 0:
-        return ToleranceInterval(None, None, chosen, n, p, content, confidence)
+        return ToleranceInterval(None, None, chosen, n, p)
     low, high = float(x[outside // 2]), float(x[n - 1 - (outside - outside // 2)])
-    return ToleranceInterval(low, high, chosen, n, p, content, confidence)
+    return ToleranceInterval(low, high, chosen, n, p)

@@ -18,7 +18,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gyrobench.bench import Bench
 from gyrobench.campaign.execution.bundle import tool_digest
 from gyrobench.campaign.execution.campaign_plan import MEASURED, CampaignPlan, PlannedRun, make_plan
 from gyrobench.campaign.execution.clusters import connect, has_own_processes, is_local, is_temporary
@@ -98,7 +97,6 @@ def execute_campaign(
     retry: bool = False,
     notes: Callable[[Iterable[str]], None] = lambda _: None,
     progress: Callable[[CampaignProgress], None] | None = None,
-    bench: Bench | None = None,
 ) -> CampaignOutcome:
     """Run what the store at ``out`` does not have of a campaign; return what it has then.
 
@@ -112,7 +110,7 @@ def execute_campaign(
     except ImportError:
         raise MissingPackageError("campaigns need further packages: pip install 'gyrobench[campaign]'") from None
     with CampaignStore(out) as store:
-        plan = make_plan(definition, bench)
+        plan = make_plan(definition)
         notes(plan.notes)
         stored = store.begin(plan.document(), plan.columns(), plan.units)
         if retry:

@@ -106,9 +106,9 @@ class CampaignPlan:
         return any(name for setup in self.setups for name in setup)
 
 
-def make_plan(definition: Definition, bench: Bench | None = None) -> CampaignPlan:
+def make_plan(definition: Definition) -> CampaignPlan:
     """Return the plan; FMUs are built.  Raises UsageError and what the system raises for what no run can have."""
-    return _Planner(definition, bench or Bench.find()).plan()
+    return _Planner(definition, Bench.find()).plan()
 
 
 class _Planner:

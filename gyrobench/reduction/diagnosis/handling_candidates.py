@@ -176,17 +176,15 @@ def shifted(record: Record, columns: Sequence[str], words: str) -> Iterator[Hand
         yield HandlingCandidate(f"{words} belonging to {where}", Record(rows, {}, record.run))
 
 
-def exchanged_rows(
-    record: Record, columns: Sequence[str], words: str, most: int = 80, far: int = 0
-) -> Iterator[HandlingCandidate]:
+def exchanged_rows(record: Record, columns: Sequence[str], words: str, far: int = 0) -> Iterator[HandlingCandidate]:
     """Two groups of rows exchanged in ``columns``, whose equal values make a group: those that follow one another, of
-    up to ``most`` groups; any two, of up to ``far``.
+    up to 80 groups; any two, of up to ``far``.
     """
     w = record.windows
     table = np.column_stack([np.asarray(w[c], dtype=float) for c in columns])
     new = np.concatenate([[True], np.any(np.abs(np.diff(table, axis=0)) > 1e-4 * np.ptp(table, axis=0), axis=1)])
     first = np.flatnonzero(new)
-    if not 2 <= first.size <= most:
+    if not 2 <= first.size <= 80:
         return
     group = np.cumsum(new) - 1
     for a, b in combinations(range(first.size), 2):

@@ -53,10 +53,10 @@ def fit(start: Array, end: Array, y: Array, order: int = 2) -> Fit:
     return least_squares(X, y, names)
 
 
-def whole_turns(start: Array, end: Array, tolerance: float = 0.01) -> float | None:
+def whole_turns(start: Array, end: Array) -> float | None:
     """Return the number of turns the windows of one phase cover without gap, or None unless it is a whole number."""
     turned = float(np.sum(np.abs(end - start))) / (2.0 * math.pi)
     span = abs(float(end[-1] - start[0])) / (2.0 * math.pi)
     whole = round(turned)
-    good = whole >= 1 and abs(turned - whole) < tolerance and abs(span - turned) < tolerance
+    good = whole >= 1 and abs(turned - whole) < 0.01 and abs(span - turned) < 0.01
     return float(whole) if good else None

@@ -25,6 +25,7 @@ from gyrobench.reduction.setup.stops import spacing
 from gyrobench.result import Harmonic, Table
 
 AGREE, HIGH = "turns.agree", "turns.harmonics"  # ids of the tests
+HIGHEST = 6  # harmonic that is tested
 
 
 @dataclass
@@ -59,10 +60,10 @@ class Turns:
         )  # fmt: skip
 
     # ------------------------------------------------------------------------------------------ harmonics
-    def _harmonic_test(self, top: int = 6) -> None:
+    def _harmonic_test(self) -> None:
         columns, labels = [], []
         for (label, mine), step in zip(self.phases, self.spacing, strict=True):
-            orders = range(self.held + 1, min(top, int(0.45 * 2.0 * math.pi / step)) + 1)
+            orders = range(self.held + 1, min(HIGHEST, int(0.45 * 2.0 * math.pi / step)) + 1)
             if len(orders):
                 block, _ = harmonic.columns(self.start, self.end, orders)
                 columns.append(np.where(mine[:, None], block, 0.0))

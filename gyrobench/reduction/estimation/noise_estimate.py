@@ -42,7 +42,6 @@ class Evidence:
     u: Array
     change: Array  # (p,)
     u_without: Array
-    u_with: Array
     scatter: tuple[float, float, float, float]  # of its constants: mean, standard deviation, 2.5 % and 97.5 % point
 
     @property

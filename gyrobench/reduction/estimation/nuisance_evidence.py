@@ -48,9 +48,7 @@ def evidence_of(
             part = np.where(present[:, None], w, 0.0).ravel()
             spread = _moments_of(size.ravel(), part)
         change, u_without = with_it[:p] - without[:p], np.maximum(u_without[:p], 1e-300)
-        found.append(
-            Evidence(block, probability, with_it[columns], u_with[columns], change, u_without, u_with[:p], spread)
-        )
+        found.append(Evidence(block, probability, with_it[columns], u_with[columns], change, u_without, spread))
     return found
 
 

@@ -77,7 +77,7 @@ def reduce_days(record: Record, reduce: Callable[[Mapping[str, Array]], DriftTes
     return combine_days(each) if len(each) > 1 else next(iter(each.values()))
 
 
-def combine_days(results: Mapping[str, DriftTestResult], what: str = "day") -> DriftTestResult:
+def combine_days(results: Mapping[str, DriftTestResult]) -> DriftTestResult:
     """One result of repeats (name of the day -> its result) with the same coefficients.
 
     Estimates are means over the days with the scatter of the days as type A; a day's type B part is taken as common
@@ -86,13 +86,13 @@ def combine_days(results: Mapping[str, DriftTestResult], what: str = "day") -> D
     not the same.
     """
     if len(results) < 2:
-        raise ReductionError(f"{len(results)} {what}: at least two are needed for a scatter from {what} to {what}")
+        raise ReductionError(f"{len(results)} day: at least two are needed for a scatter from day to day")
     results = _without_own_effects(results)
     days, parts = list(results), list(results.values())
     names = [c.name for c in parts[0].coefficients]
     for day, r in results.items():
         if [c.name for c in r.coefficients] != names:
-            raise ReductionError(f"{what} {day}: coefficients differ from those of {what} {days[0]}; reduce them alike")
+            raise ReductionError(f"day {day}: coefficients differ from those of day {days[0]}; reduce them alike")
     n = len(parts)
     table = np.array([[c.estimate for c in r.coefficients] for r in parts])
     coefficients, series, tests, budget = [], [], [], []
@@ -103,15 +103,13 @@ def combine_days(results: Mapping[str, DriftTestResult], what: str = "day") -> D
         u_own = [c.u_a or 0.0 for c in per_day]
         if min(u_own) > 0.0 and stats.sigma > 1e-9 * float(np.max(np.abs(table[:, j]))):
             q, p = agreement(table[:, j].tolist(), u_own)
-            text = f"varies from {what} to {what} by more than its noise" if p < 0.05 else "constant within its noise"
-            tests.append(
-                Test(f"{REPEATS}:{name}", f"{what} to {what}, {name}", q, p, f"change between the {what}s", text)
-            )
+            text = "varies from day to day by more than its noise" if p < 0.05 else "constant within its noise"
+            tests.append(Test(f"{REPEATS}:{name}", f"day to day, {name}", q, p, "change between the days", text))
         c, x, y = coefficients[-1], np.arange(1.0, n + 1.0), table[:, j]
-        series.append(Series.of(name, (x, what, ""), (y, name, c.unit), [stats.mean] * n, y - stats.mean, x))
-        note = f"Type A, standard deviation over {n} {what}s divided by √{n}"
+        series.append(Series.of(name, (x, "day", ""), (y, name, c.unit), [stats.mean] * n, y - stats.mean, x))
+        note = f"Type A, standard deviation over {n} days divided by √{n}"
         size = (stats.u, c.unit, 1.0, "1", stats.u, c.unit, name, note)
-        budget.append(BudgetLine(TYPE_A, f"repeatability from {what} to {what}", *size))
+        budget.append(BudgetLine(TYPE_A, "repeatability from day to day", *size))
         budget += [b for b in parts[0].budget if b.coefficient == name and b.id != TYPE_A]
     varying = [t.id.partition(":")[2] for t in tests if t.p is not None and t.p < 0.05]
     variation = f"{', '.join(varying)} vary" if varying else "no coefficient varies"
@@ -119,7 +117,7 @@ def combine_days(results: Mapping[str, DriftTestResult], what: str = "day") -> D
     scatter = replace(  # what the residuals of one day show is not of the mean
         first,
         dof=float(n - 1),
-        noise={"model": f"standard deviation over {n} {what}s, treated as independent"},
+        noise={"model": f"standard deviation over {n} days, treated as independent"},
         residual_std=math.sqrt(float(np.mean([r.residual_std**2 for r in parts]))),
         acf=None, allan=None, psd=None, harmonics=[],
     )  # fmt: skip
@@ -132,19 +130,19 @@ def combine_days(results: Mapping[str, DriftTestResult], what: str = "day") -> D
         budget=budget,
         repeatability={f"σ of {c.name} / ({c.unit})": statistics(table[:, j].tolist()).sigma
                        for j, c in enumerate(first.coefficients)},
-        tables=[_table(days, parts, table, what),
-                *(replace(t, id=f"{t.id}:{days[0]}", title=f"{t.title}, {what} {days[0]}") for t in first.tables)],
-        reasons=_reasons(results, what),
+        tables=[_table(days, parts, table),
+                *(replace(t, id=f"{t.id}:{days[0]}", title=f"{t.title}, day {days[0]}") for t in first.tables)],
+        reasons=_reasons(results),
         summary=[
-            f"{n} {what}s; {variation} from {what} to {what} by more than noise.", *_few(coefficients, table, what)
+            f"{n} days; {variation} from day to day by more than noise.", *_few(coefficients, table)
         ],
     )  # fmt: skip
 
 
-def _reasons(results: Mapping[str, DriftTestResult], what: str) -> list[Reason]:
+def _reasons(results: Mapping[str, DriftTestResult]) -> list[Reason]:
     """Return what limits the days: a warning of several once, a doubt of one with its day."""
     found = [
-        r if r.severity in ("error", "warning") else replace(r, text=f"{what} {day}: {r.text}", names=(), intervals={})
+        r if r.severity in ("error", "warning") else replace(r, text=f"day {day}: {r.text}", names=(), intervals={})
         for day, result in results.items()
         for r in result.reasons
         if r.severity != "condition"
@@ -165,10 +163,10 @@ def _without_own_effects(results: Mapping[str, DriftTestResult]) -> dict[str, Dr
     return out
 
 
-def _few(coefficients: list[Coefficient], table: Array, what: str) -> list[str]:
+def _few(coefficients: list[Coefficient], table: Array) -> list[str]:
     sigma = [statistics(column).sigma for column in table.T.tolist()]
     both = list(zip(coefficients, sigma, strict=True))[:2]
-    return [f"{c.name} = {plain(c.estimate, 6)} {c.unit}, σ over the {what}s {plain(s)} {c.unit}." for c, s in both]
+    return [f"{c.name} = {plain(c.estimate, 6)} {c.unit}, σ over the days {plain(s)} {c.unit}." for c, s in both]
 
 
 def _mean(per_day: list[Coefficient]) -> Coefficient:
@@ -201,7 +199,7 @@ def _correlation(table: Array) -> list[list[float]]:
     return matrix
 
 
-def _table(days: list[str], parts: list[DriftTestResult], table: Array, what: str) -> Table:
+def _table(days: list[str], parts: list[DriftTestResult], table: Array) -> Table:
     """Like Table 3-1: a row for each day, then mean and standard deviation; under it the days' own u of type A."""
     per_coefficient = [statistics(column) for column in table.T.tolist()]
     u_own = [
@@ -212,8 +210,8 @@ def _table(days: list[str], parts: list[DriftTestResult], table: Array, what: st
     rows += [
         ["mean", *(s.mean for s in per_coefficient)],
         ["σ (n − 1)", *(s.sigma for s in per_coefficient)],
-        [f"u within a {what}", *u_own],
+        ["u within a day", *u_own],
     ]
     head = [f"{c.name} / ({c.unit})" for c in parts[0].coefficients]
-    caption = f"Estimates of each {what}, their mean and standard deviation"
-    return Table("repeats", f"Estimates by {what}", caption, [what, *head], rows)
+    caption = "Estimates of each day, their mean and standard deviation"
+    return Table("repeats", "Estimates by day", caption, ["day", *head], rows)

@@ -95,7 +95,7 @@ class LoopFindings(MeasureFindings):
 
     # ------------------------------------------------------------------ frequency responses
     def open_loop(
-        self, loop: str, inside: str, test: str, axis: int = 1, name: str = "", up_to: float = 2.0, kind: str = "test",
+        self, loop: str, inside: str, test: str, axis: int = 1, kind: str = "test",
         held: Mapping[str, float] | None = None, late: float = 0.0,
     ) -> list[Point]:  # fmt: skip
         """Return the open loop L = -(inside - test) / inside of the sines of a kind on an axis, with margins.
@@ -103,7 +103,7 @@ class LoopFindings(MeasureFindings):
         loop: name of System.loops.  inside: the channel with the signal in the loop behind the summing point ("e"),
         test: what was added there.  held: slot that holds what comes back from sample to sample -> when its first
         one is there, s; the last of them counts.  late: as open_loop_point.  Adds the Bode plot, a table of margins
-        (measured, and of both linear models), the agreement up to ``up_to`` crossovers, and the coefficients crossover
+        (measured, and of both linear models), the agreement up to two crossovers, and the coefficients crossover
         and phase margin.  Returns the points that count.
         """
         sines = sorted(self.of(kind, axis, "sine"), key=lambda g: g.f)
@@ -115,7 +115,7 @@ class LoopFindings(MeasureFindings):
         )
         counts = [c and not self.unstable for c in counts]
         sure = [p for p, c in zip(points, counts, strict=True) if c]
-        title = name or f"open loop, {loop}"
+        title = f"open loop, {loop}"
         models = self.linear.loops.get(loop, LinearPair())
         caption = (
             f"Gain and phase of the {title}. Points: measured in the co-simulation, with 95 % error bars; lines: "
@@ -138,7 +138,7 @@ class LoopFindings(MeasureFindings):
             rows[kind] = limits.row(label)
             curves.append(curve(label, span, dense))
             if limits.crossover is not None:
-                self._agreement(sure, model_response(linear, at)[:, 0, 0], limits, (label, title), up_to)
+                self._agreement(sure, model_response(linear, at)[:, 0, 0], limits, (label, title))
         if computed and not self.unstable:
             self._conditional(title, computed.get("continuous") or computed["discrete"])
         drawn = bode(title, "loop", caption, points, curves, "gain", "1")
@@ -249,10 +249,8 @@ class LoopFindings(MeasureFindings):
             text = f"The {title} crosses at {plain(crossover, 3)} Hz, not at the {plain(wanted, 4)} Hz asked for."
             self.warn("loop.crossover_missed", text)
 
-    def _agreement(
-        self, points: Sequence[Point], model: Any, limits: m.Margins, names: tuple[str, str], up_to: float
-    ) -> None:
-        limit = up_to * float(limits.crossover or 0.0)
+    def _agreement(self, points: Sequence[Point], model: Any, limits: m.Margins, names: tuple[str, str]) -> None:
+        limit = 2.0 * float(limits.crossover or 0.0)
         db, degrees = m.deviation(points, model, limit)
         count = sum(p.f <= limit * (1.0 + 1e-9) for p in points)
         self.agreement.append([names[0], limit, count, db, degrees, names[1]])

@@ -53,12 +53,12 @@ def command_step(
 
 
 def isolation_near(
-    found: LoopFindings, points: Sequence[Point], closed: Callable[[float], complex | None], at: float = 1.0
-) -> None:
-    """Add the measured isolation next to a frequency, in dB, beside the closed form; nothing without points."""
+    found: LoopFindings, points: Sequence[Point], closed: Callable[[float], complex | None]
+) -> None:  # fmt: skip
+    """Add the measured isolation next to 1 Hz, in dB, beside the closed form; nothing without points."""
     if not points:
         return
-    nearest = min(points, key=lambda q: abs(q.f - at))
+    nearest = min(points, key=lambda q: abs(q.f - 1.0))
     size, form = (None if not x else 20.0 * math.log10(abs(x)) for x in (nearest.value, closed(nearest.f)))
     meaning = f"platform over base at {nearest.f:g} Hz"
     found.measure("isolation", meaning, "dB", size, DECIBEL * (nearest.u or 0.0), closed=form)

@@ -29,13 +29,13 @@ def spacing(start: Array, end: Array) -> float:
     return float(np.median(np.diff(angles, append=angles[0] + 2.0 * math.pi)))
 
 
-def whole_stops(start: Array, end: Array, tolerance: float = 0.01) -> bool:
+def whole_stops(start: Array, end: Array) -> bool:
     """Return whether a table rests at equally spaced angles of the circle, in equally many windows at each."""
     angles = rests(start, end)
     steps = np.diff(angles, append=angles[0] + 2.0 * math.pi) * angles.size / (2.0 * math.pi)
     off = np.mod((start + end) / 2.0 - angles[0], 2.0 * math.pi) * angles.size / (2.0 * math.pi)
     counts = np.bincount(np.rint(off).astype(int) % angles.size, minlength=angles.size)
-    return bool(np.all(np.abs(steps - 1.0) < tolerance) and np.all(counts == counts[0]))
+    return bool(np.all(np.abs(steps - 1.0) < 0.01) and np.all(counts == counts[0]))
 
 
 def stop_problems(start: Array, end: Array, t_start: Array, t_end: Array) -> list[str]:

@@ -162,7 +162,7 @@ def probability(Q: float, m: int, few: Array, w: Array) -> float:
     return float(special.fdtrc(m - 1, (m * m - 1) / (3.0 * spread), F))
 
 
-def outlier(values: Sequence[MethodValue], level: float = LEVEL) -> tuple[str, float] | None:
+def outlier(values: Sequence[MethodValue]) -> tuple[str, float] | None:
     """Return the one test without which the others agree, and their p then.
 
     None for fewer than three, or where there is none or more than one.
@@ -170,5 +170,5 @@ def outlier(values: Sequence[MethodValue], level: float = LEVEL) -> tuple[str, f
     if len(values) < 3:
         return None
     p_without = [(v.label, combine_values([o for o in values if o is not v]).p) for v in values]
-    cured = [(label, p) for label, p in p_without if p >= level]
+    cured = [(label, p) for label, p in p_without if p >= LEVEL]
     return cured[0] if len(cured) == 1 else None
