@@ -13,7 +13,7 @@ from typing import Any
 
 from gyrobench.engine.fmu_instance import ENDED, NO_PROGRESS, FmuCallError, FmuInstance, status_text, with_signatures
 from gyrobench.engine.program import VariableGroup, type_code
-from gyrobench.engine.run_board import GET, SET, STEP, Status
+from gyrobench.engine.run_board import STEP, Status
 from gyrobench.system.binding import Bound
 from gyrobench.system.fmu_variables import variables
 
@@ -67,24 +67,6 @@ class FmuInstance3(FmuInstance):
     def initialize(self, t0: float) -> None:
         """Call enterInitializationMode."""
         self.call("enterInitializationMode", self.fmu.enterInitializationMode, startTime=t0)
-
-    def write(self, group: VariableGroup, call: str = "") -> None:
-        """Set the values of a group."""
-        name = f"Set{group.type.call}"
-        self.status.part, self.status.call = self.part, SET + group.code
-        try:
-            self.function(name)(self.component, group.references, group.n_references, group.values, group.n)
-        except Exception as error:
-            raise self.fail(call or name[0].lower() + name[1:], error) from None
-
-    def read(self, group: VariableGroup) -> None:
-        """Get the values of a group."""
-        name = f"Get{group.type.call}"
-        self.status.part, self.status.call = self.part, GET + group.code
-        try:
-            self.function(name)(self.component, group.references, group.n_references, group.values, group.n)
-        except Exception as error:
-            raise self.fail(name[0].lower() + name[1:], error) from None
 
     def do_step(self, t: float, h: float) -> None:
         """Do one communication step; where the FMU returns early, go on from there with the same inputs."""

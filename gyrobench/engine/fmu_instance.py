@@ -212,23 +212,21 @@ class FmuInstance:
         self.call("exitInitializationMode", self.fmu.exitInitializationMode)
         self.initialized = True
 
-    def write(self, group: VariableGroup) -> None:
-        """Set the values of a group."""
-        name = f"Set{group.type.call}"
-        self.status.part, self.status.call = self.part, SET + group.code
-        try:
-            self.function(name)(self.component, group.references, group.n_references, group.values)
-        except Exception as error:
-            raise self.fail(name[0].lower() + name[1:], error) from None
+    def write(self, group: VariableGroup, call: str = "") -> None:
+        """Set the values of a group; call: what a failure names, the function without it."""
+        self._transfer(f"Set{group.type.call}", SET, group, call)
 
     def read(self, group: VariableGroup) -> None:
         """Get the values of a group."""
-        name = f"Get{group.type.call}"
-        self.status.part, self.status.call = self.part, GET + group.code
+        self._transfer(f"Get{group.type.call}", GET, group)
+
+    def _transfer(self, name: str, code: int, group: VariableGroup, call: str = "") -> None:
+        self.status.part, self.status.call = self.part, code + group.code
+        count = (group.n,) if self.fmi3 else ()
         try:
-            self.function(name)(self.component, group.references, group.n_references, group.values)
+            self.function(name)(self.component, group.references, group.n_references, group.values, *count)
         except Exception as error:
-            raise self.fail(name[0].lower() + name[1:], error) from None
+            raise self.fail(call or name[0].lower() + name[1:], error) from None
 
     def do_step(self, t: float, h: float) -> None:
         """Do one communication step; a status worse than warning is a failure."""

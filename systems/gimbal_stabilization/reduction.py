@@ -12,11 +12,7 @@ class Reduction(SightReduction):
     ranked_by = "jitter"
 
     def measure(self) -> Account:
-        found = self.found
-        for gate in found.of("torque", shape="step"):
-            self.load(gate)
-        for axis, k in AXES.items():
-            found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k, held={"gyro": 0.0})
+        self.loads_and_loops()
         self.isolation()
         ride = self.ride()
         self.cause = self.jitter(ride) if ride is not None else ""

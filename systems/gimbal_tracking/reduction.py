@@ -31,11 +31,7 @@ class Reduction(TrackingMeasures, SightReduction):
     what = "tracking error"
 
     def measure(self) -> Account:
-        found = self.found
-        for gate in found.of("torque", shape="step"):
-            self.load(gate)
-        for axis, k in AXES.items():
-            found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k, held={"gyro": 0.0})
+        self.loads_and_loops()
         self.loops()
         self.isolation()
         self.cause, ride = "", self.ride()

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from gyrobench.arrays import Array
 from gyrobench.record.record import Record
 from gyrobench.reduction.loops.loop_measures import Gate, gates
-from gyrobench.reduction.loops.response_errors import line_ratios
+from gyrobench.reduction.loops.response_errors import line_ratios, stated_u
 from gyrobench.reduction.setup.window_checks import ReductionError
 
 LEAST = 8  # frequencies
 TABLE, GYRO = "table.rate_read", "gyro.rate[1]"
 IMAGE = 2.0  # lines of the record from a sine to its image, at least
-UNKNOWN = 1e-3  # of the points of a record that states none: any, the scatter about the curve takes its place
 
 
 @dataclass(frozen=True)
@@ -53,10 +52,7 @@ def _of_rows(record: Record) -> Points:
     w = {n: np.asarray(v, dtype=float) for n, v in record.windows.items()}
     if np.any(w["table"] <= 0.0):
         raise ReductionError("table: the amplitude of a rate is above 0; a lag belongs into phase")
-    known = "u" in w and bool(np.all(np.isfinite(w["u"])))
-    if known and np.any(w["u"] <= 0.0):
-        raise ReductionError("u: a relative standard uncertainty above 0 is expected")
-    u = w["u"] if known else np.full(w["table"].size, UNKNOWN)
+    known, u = stated_u(w)
     return Points(w["frequency"], w["gyro"] / w["table"] * np.exp(1j * w["phase"]), u, w["table"], known)
 
 

@@ -7,21 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from gyrobench.system.families import vibrating_table
 from gyrobench.system.families.option_groups import SITE
 from gyrobench.system.families.rate_reading import RATE_NOISES
 from gyrobench.system.families.table_test import ON_TABLE
-from gyrobench.system.families.vibrating_table import (
-    FREQUENCIES,
-    MOUNT,
-    SHAKEN,
-    STATED,
-    TABLE,
-    TIMES,
-    frequency_problems,
-)
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.system import Option, Slot, System
+from gyrobench.system.system import Option, Slot
 from gyrobench.units import DEG
 
 from .measured import MEASURED
@@ -29,7 +21,7 @@ from .measured import MEASURED
 WAY = 0.5  # rad, largest angle of the table
 
 
-class GyroBandwidth(System):
+class GyroBandwidth(vibrating_table.ShakenTest):
     """A vibrating table shakes a rate gyro about its input axis at one frequency after another; gain and phase of what
     it indicates, against the rate of the table, give its bandwidth, delay and equivalent order.
 
@@ -42,22 +34,20 @@ class GyroBandwidth(System):
     slots = {
         "site": Slot("Site", "site"),
         "exciter": Slot("Excitation", "exciter"),
-        "table": Slot(TABLE, "rate_table_vibrating"),
+        "table": Slot(vibrating_table.TABLE, "rate_table_vibrating"),
         "gyro": Slot("RateGyro", "gyro_vibratory"),
     }
-    wires = SHAKEN + "table -> gyro: omega f"
+    wires = vibrating_table.SHAKEN + "table -> gyro: omega f"
     options = (
         SITE
-        | FREQUENCIES
+        | vibrating_table.FREQUENCIES
         | {"rate": Option("10deg/s", "rad/s", "amplitude of the table rate", 1e-9)}
-        | TIMES
-        | STATED
-        | MOUNT
+        | vibrating_table.TIMES
+        | vibrating_table.STATED
+        | vibrating_table.MOUNT
     )
-    assumed = ("table.base", "table.face", "gyro.mount", "table.read_gain?", "table.read_lag?")
     noises = ("table.reading", "gyro.pickoff", *RATE_NOISES)
     sampled_gyro = True
-    done = "exciter.done"
     step = 1e-4
     channels = ("exciter.phase", "exciter.gate", "table.rate_read", "gyro.rate[1]", "gyro.saturated")
     shown = ("table.rate_read", "gyro.rate")
@@ -67,11 +57,6 @@ class GyroBandwidth(System):
     def channel_period(self) -> float:  # type: ignore[override]
         """At least twelve samples a period, whole steps apart."""
         return float(max(1, math.floor(1.0 / (12.0 * self["highest"] * self.step) + 1e-9)) * self.step)
-
-    def frequencies(self) -> list[float]:
-        """Return the frequencies of the plan, Hz."""
-        found: list[float] = np.geomspace(self["lowest"], self["highest"], self["points"]).tolist()
-        return found
 
     def plan(self) -> LoopPlan:
         phases = []
@@ -85,7 +70,7 @@ class GyroBandwidth(System):
         return {**self.plan().parameters(), **self.owned(), "table.base": np.eye(3), "table.face": np.array(ON_TABLE)}
 
     def check(self) -> list[str]:
-        problems = frequency_problems(self["lowest"], self["highest"], self.step)
+        problems = super().check()
         way = self["rate"] / (2.0 * math.pi * self["lowest"])
         if way > WAY:
             problems.append(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import integrate
 
 from gyrobench.reduction.loops.loop_measures import Gate, gates
-from gyrobench.reduction.loops.response_errors import line_ratios
+from gyrobench.reduction.loops.response_errors import line_ratios, stated_u
 from gyrobench.reduction.toolkit import Array, Record, ReductionError, plain
 
 from .model import AngleResponse
@@ -19,7 +19,6 @@ from .steps import LEAST, TableTurn, turns_of
 FREQUENCIES = 8  # at least
 SLOWEST, FASTEST = 1e-6, 1e6  # Hz: beyond there is no table, and powers of them exceed the numbers
 TABLE, PICKOFF = "table.rate_read", "gyro.u"
-UNKNOWN = 1e-3  # of the points of a record that states none: any, the scatter about the curve takes its place
 
 
 @dataclass(frozen=True)
@@ -44,10 +43,7 @@ def _of_rows(record: Record, K_sg: float, output: bool) -> ShakenPoints:
     w = {n: np.asarray(v, dtype=float) for n, v in record.windows.items()}
     if np.any(w["table"] <= 0.0) or np.any(w["pickoff"] <= 0.0):
         raise ReductionError("table, pickoff: an amplitude is above 0; a lag belongs into phase")
-    known = "u" in w and bool(np.all(np.isfinite(w["u"])))
-    if known and np.any(w["u"] <= 0.0):
-        raise ReductionError("u: a relative standard uncertainty above 0 is expected")
-    u = w["u"] if known else np.full(w["table"].size, UNKNOWN)
+    known, u = stated_u(w)
     value = np.asarray(w["pickoff"] / (K_sg * w["table"]) * np.exp(1j * w["phase"]), dtype=complex)
     return _checked(w["frequency"], value, u, w["table"], output, known)
 

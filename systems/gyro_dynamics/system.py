@@ -15,7 +15,7 @@ from gyrobench.system.families.option_groups import SITE, type_b
 from gyrobench.system.families.table_test import ON_TABLE, SDF_NOISES
 from gyrobench.system.loop_plan import LoopPhase, LoopPlan
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.system import Option, Slot, System
+from gyrobench.system.system import Option, Slot
 
 from . import sources
 from .measured import MEASURED
@@ -25,7 +25,7 @@ OUTPUT_ON_TABLE = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 FACES = {"input": ON_TABLE, "output": OUTPUT_ON_TABLE}
 
 
-class GyroDynamics(System):
+class GyroDynamics(vibrating_table.ShakenTest):
     """A table shakes a floated gyro about its input or its output axis, its loop open, at one frequency after another,
     and turns it to and fro; the float angle against that of the table gives time constant, stiffnesses and response.
 
@@ -65,9 +65,7 @@ class GyroDynamics(System):
         | type_b(sources)
         | vibrating_table.MOUNT
     )
-    assumed = ("table.base", "table.face", "gyro.mount", "table.read_gain?", "table.read_lag?")
     noises = ("table.reading", *SDF_NOISES)
-    done = "exciter.done"
     step = 5e-5
     channels = ("exciter.phase", "exciter.gate", "table.rate_read", "gyro.u", "gyro.saturated")
     shown = ("table.rate_read", "gyro.u")
@@ -78,11 +76,6 @@ class GyroDynamics(System):
         """At least twelve samples a period and forty a turn, whole steps apart."""
         finest = min(1.0 / (12.0 * self["highest"]), self["rise"] / 40.0)
         return float(max(1, math.floor(finest / self.step + 1e-9)) * self.step)
-
-    def frequencies(self) -> list[float]:
-        """Return the frequencies of the plan, Hz."""
-        found: list[float] = np.geomspace(self["lowest"], self["highest"], self["points"]).tolist()
-        return found
 
     def turns(self) -> int:
         """Return how many steps there are: about the input axis alone, where the float keeps an angle."""
@@ -111,7 +104,7 @@ class GyroDynamics(System):
         return base[[2, 1, 0]] * [[1.0], [-1.0], [1.0]] if self["axis"] == "output" else base
 
     def check(self) -> list[str]:
-        problems = vibrating_table.frequency_problems(self["lowest"], self["highest"], self.step)
+        problems = super().check()
         if self["axis"] not in FACES:
             problems.append(f"axis = {self['axis']}: must be input or output")
         if 0 < self["steps"] < 3:

@@ -9,8 +9,18 @@ K_m K_x / (J_x s2), is the loop gain without network; theta/M is 1/(J_x s2 + K_m
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
+
+
+def crossover(gain: Callable[[complex], complex]) -> float:
+    """Return the frequency, rad/s, at which |gain| falls through 1."""
+    low, high = 1e-6, 1e6
+    for _ in range(200):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if abs(gain(1j * middle)) > 1.0 else (low, middle)
+    return low
 
 
 @dataclass(frozen=True)
@@ -67,14 +77,9 @@ class LagLeadLoop:
 
     def margin(self) -> tuple[float, float]:
         """Return crossover (rad/s) and phase margin (degrees); |L| falls with the frequency: there is one."""
-        low, high = 1e-6, 1e6
-        for _ in range(200):
-            middle = math.sqrt(low * high)
-            low, high = (middle, high) if abs(self.gain(1j * middle)) > 1.0 else (low, middle)
-        turn = sum(math.atan(x * low) for x in (self.tau1, self.tau2)) - sum(
-            math.atan(x * low) for x in (self.T1, self.T2)
-        )
-        return low, math.degrees(turn)
+        w = crossover(self.gain)
+        turn = sum(math.atan(x * w) for x in (self.tau1, self.tau2)) - sum(math.atan(x * w) for x in (self.T1, self.T2))
+        return w, math.degrees(turn)
 
     def slope(self, w: float) -> float:
         """Return d 20 log|L| / d log10 w at w, dB per decade: -40 without the network."""
@@ -125,11 +130,8 @@ class DoubleLoop:
 
     def margin(self) -> tuple[float, float]:
         """Return crossover (rad/s) and phase margin (degrees) of the position loop."""
-        low, high = 1e-6, 1e6
-        for _ in range(200):
-            middle = math.sqrt(low * high)
-            low, high = (middle, high) if abs(self.gain(1j * middle)) > 1.0 else (low, middle)
-        return low, 90.0 - math.degrees(math.atan(self.J * low / self.D) + math.atan(self.integral / low))
+        w = crossover(self.gain)
+        return w, 90.0 - math.degrees(math.atan(self.J * w / self.D) + math.atan(self.integral / w))
 
     def slope(self, w: float) -> float:
         """Return d 20 log|L| / d log10 w at w, dB per decade."""

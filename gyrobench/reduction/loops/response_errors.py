@@ -6,7 +6,7 @@ The sensitivity of a figure is taken by moving the points and taking the figures
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,6 +43,7 @@ LEFT_OUT = {
     "state u_gain.",
     READING_LAG.id: "The intervals of {} include no lag of the table reading, which no residual shows: state u_lag.",
 }
+UNKNOWN = 1e-3  # u of points that state none: any, the scatter about the curve takes its place
 BEND = 3  # degree in ln f of the logarithm of the noise, which is smooth
 ROOT_POWER = math.exp(0.5 * (math.log(LINES / 2.0) - float(special.psi(LINES / 2.0))))  # 1 over exp(mean ln s)
 
@@ -95,6 +96,15 @@ def _noise(gate: Gate, channel: str) -> float:
     if found is None:
         raise ReductionError(f"{gate.f:g} Hz: too few periods to see the noise beside the line")
     return found
+
+
+def stated_u(w: Mapping[str, Array]) -> tuple[bool, Array]:
+    """Return whether the rows of a measured response state u, and u (n,); ReductionError for one that cannot be."""
+    if "u" not in w or not np.all(np.isfinite(w["u"])):
+        return False, np.full(w["table"].size, UNKNOWN)
+    if np.any(w["u"] <= 0.0):
+        raise ReductionError("u: a relative standard uncertainty above 0 is expected")
+    return True, w["u"]
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,13 @@ class SightReduction(LoopReduction):
         """Return the ride, in which the base vibrates; None where it is not whole in the record."""
         return next((g for g in self.found.of("hold") if g.label == "ride"), None)
 
+    def loads_and_loops(self) -> None:
+        """Measure the steps of the loads and the open loops of both axes."""
+        for gate in self.found.of("torque", shape="step"):
+            self.load(gate)
+        for axis, k in AXES.items():
+            self.found.open_loop(axis, f"{axis}.e", f"exciter.test[{k}]", k, held={"gyro": 0.0})
+
     def load(self, gate: Gate) -> None:
         """Measure the largest angle of the line of sight after a step of the load."""
         k = 0 if gate.axis == 1 else 1

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from gyrobench.reduction.setup.sources import READING_GAIN, READING_LAG
 from gyrobench.system.connectors import Socket, inp, out
 from gyrobench.system.families.option_groups import type_b
-from gyrobench.system.system import Option
+from gyrobench.system.system import Option, System
 
 TABLE = Socket(
     "VibratingTable",
@@ -41,11 +43,21 @@ STATED = type_b(READING_GAIN, READING_LAG, "time")
 MOUNT = type_b(mount="standard uncertainty of the input axis against the table axis, about each axis across it")
 
 
-def frequency_problems(lowest: float, highest: float, step: float) -> list[str]:
-    """Return what is wrong with the frequencies (Hz) for a communication step (s)."""
-    problems = []
-    if not lowest < highest:
-        problems.append(f"lowest = {lowest:g} Hz: must be below highest = {highest:g} Hz")
-    if highest * step > 0.05:
-        problems.append(f"highest = {highest:g} Hz: a period needs 20 communication steps of {step:g} s")
-    return problems
+class ShakenTest(System):
+    """A test at one frequency after another; its options hold :data:`FREQUENCIES`."""
+
+    assumed = ("table.base", "table.face", "gyro.mount", "table.read_gain?", "table.read_lag?")
+    done = "exciter.done"
+
+    def frequencies(self) -> list[float]:
+        """Return the frequencies of the plan, Hz."""
+        found: list[float] = np.geomspace(self["lowest"], self["highest"], self["points"]).tolist()
+        return found
+
+    def check(self) -> list[str]:
+        problems, highest = super().check(), self["highest"]
+        if not self["lowest"] < highest:
+            problems.append(f"lowest = {self['lowest']:g} Hz: must be below highest = {highest:g} Hz")
+        if highest * self.step > 0.05:
+            problems.append(f"highest = {highest:g} Hz: a period needs 20 communication steps of {self.step:g} s")
+        return problems
