@@ -130,6 +130,19 @@ def _promising(
     return [*best, *(c for c in choices if c.windows is None)]
 
 
+def shortest(enough: Callable[[float], bool], least: float, longest: float, halvings: int) -> float:
+    """Return the length from which on it is enough, no less than ``least``, by bisection; inf beyond ``longest``."""
+    low = high = least
+    while not enough(high):
+        low, high = high, 2.0 * high
+        if high > longest:
+            return math.inf
+    for _ in range(halvings):
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if enough(middle) else (middle, high)
+    return high
+
+
 def _promised(choice: Choice, protocol: OptionProtocol, wanted: Mapping[str, float], time: float | None) -> float:
     """Return the length at which a choice reaches what is wanted with its noise known, by bisection; inf where not."""
     assert choice.windows is not None
@@ -147,12 +160,4 @@ def _promised(choice: Choice, protocol: OptionProtocol, wanted: Mapping[str, flo
         u = np.sqrt(np.diag(inverse))[index] / scale[index]
         return bool(np.all(u <= sizes))
 
-    low, high = choice.least, choice.least
-    while not enough(high):
-        low, high = high, 2.0 * high
-        if high > LONGEST:
-            return math.inf
-    for _ in range(12):
-        middle = math.sqrt(low * high)
-        low, high = (low, middle) if enough(middle) else (middle, high)
-    return high
+    return shortest(enough, choice.least, LONGEST, 12)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.design.choice_search import shortest
 from gyrobench.design.option_protocol import Choice, OptionProtocol
 from gyrobench.design.visit_protocol import GUARD, DataNoise, random_terms
 from gyrobench.record.record import Record
@@ -142,15 +143,7 @@ class _Candidates:
             merit, end = self._judged(count, share, length, wanted, criterion)
             return merit <= 1.0 if time is None else end >= time
 
-        low = high = LEAST * count
-        while not enough(high):
-            low, high = high, 2.0 * high
-            if high > LONGEST:
-                return math.inf
-        for _ in range(8):
-            middle = math.sqrt(low * high)
-            low, high = (low, middle) if enough(middle) else (middle, high)
-        return high
+        return shortest(enough, LEAST * count, LONGEST, 8)
 
     def _judged(
         self, count: int, share: float, length: float, wanted: Mapping[str, float], criterion: str
