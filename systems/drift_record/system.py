@@ -76,8 +76,8 @@ class DriftRecord(RateReading):
         elif slot not in self.slots:
             self.set("reading", FORCE)
 
-    def _arrange(self) -> None:
-        super()._arrange()
+    def arrange(self) -> None:
+        super().arrange()
         if self["reading"] == FORCE:
             accelerometers = self.on_request[ACCELEROMETERS].slots[ACCELEROMETERS]
             vars(self).update(

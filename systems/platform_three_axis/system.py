@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrobench.system.families import loop_test as loop
+from gyrobench.system.families.arranged import Arranged
 from gyrobench.system.families.loop_test import AXES, LoopTest, ThreeAxisTest, three
 from gyrobench.system.families.three_gyros import MOUNTS, commands
 from gyrobench.system.families.three_gyros import design as three_gyros
@@ -21,8 +22,6 @@ DEG = math.pi / 180.0
 MIL = 2.0 * math.pi / 6000.0  # rad; the mil of DECOUPLE-BENCH-83MIL
 GYROS = tuple(MOUNTS)
 ESTIMATORS = {f"estimator_{axis}": gyro for axis, gyro in zip("xyz", GYROS, strict=True)}
-#: what the choice of loops changes
-ARRANGED = ("slots", "wires", "on_request", "factors", "channels", "channel_period", "noises", "loops", "shown")
 ANGLE, RATE, OPTICAL = "angle", "rate", "optical"
 SERVO = "servo_three_loop"
 #: the motors of a servo with a current loop: of the part as it is
@@ -33,7 +32,7 @@ COMMAND = 1e-3  # rad/s, of the command step
 COMMANDS = commands("exciter.command")
 
 
-class PlatformThreeAxisSystem(ThreeAxisTest):
+class PlatformThreeAxisSystem(Arranged, ThreeAxisTest):
     """Three floated gyros on the inner element of three gimbals; their signals are distributed to the motors of the
     gimbals by T2 (or are not), and a stabilizer on each axis holds the element in inertial space.
 
@@ -43,6 +42,8 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
     [PLATFORM-3AXIS-DYN, DECOUPLE-T2, DECOUPLE-BENCH-83MIL, SERVO-3LOOP; Xia 2008, section 1.3.2, ch. 5]
     """
 
+    arranged_by = "loops"
+    arranged = ("slots", "wires", "on_request", "factors", "channels", "channel_period", "noises", "loops", "shown")
     title = "Three-axis stabilized platform"
     spec = ("PLATFORM-3AXIS-DYN", "PLATFORM-3AXIS-KIN", "DECOUPLE-T2", "DECOUPLE-BENCH-83MIL", "GYRO-OA-COUPLING-Y2")
     reduction = "reduction"
@@ -135,16 +136,7 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
         if slot in AXES and not self.rates and has_port(part, "i_motor", bench):
             self.set("loops", RATE)
 
-    def set(self, name: str, value: Any) -> None:
-        super().set(name, value)
-        if name == "loops":
-            self._arrange()
-
-    def _arrange(self) -> None:
-        """Give the system the slots and wires of its loops; those that were asked for stay."""
-        asked = [slot for slot in self.on_request if slot in self.slots]
-        for changed in ARRANGED:
-            vars(self).pop(changed, None)
+    def arrange(self) -> None:
         if self.rates:
             wanted, more = rate_loops.on_request()
             kept = {n: s for n, s in self.slots.items() if n not in AXES}
@@ -167,8 +159,6 @@ class PlatformThreeAxisSystem(ThreeAxisTest):
                 channel_period=optical_loop.CHANNEL_PERIOD,
             )
         vars(self)["channels"] = self._with_limits()
-        for slot in asked:
-            self.request(slot)
 
     def phases(self) -> list[LoopPhase]:
         """Return loads, commands, base sines at 0.5, 0.7, 0.9 Hz, a sweep about x, test sines of each axis, drift; with

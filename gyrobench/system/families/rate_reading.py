@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from gyrobench.attitudes import parse
+from gyrobench.system.families.arranged import Arranged
 from gyrobench.system.families.rebalance_test import RebalanceTest
 from gyrobench.system.families.table_test import TableTest, on_table
 from gyrobench.system.part_files import has_port
@@ -29,12 +30,14 @@ RATE_NOISES = tuple(
 )  # fmt: skip
 
 
-class RateReading(RebalanceTest):
+class RateReading(Arranged, RebalanceTest):
     """A gyro at rest: torque rebalance, or a rate gyro whose axis x is read.
 
     The option reading says which; a part in the slot gyro that has an output rate sets it.
     """
 
+    arranged_by = "reading"
+    arranged = ("slots", "wires", "channels", "noises", "assumed", "read_by", "windows")
     rate_gyro: ClassVar[str]  # the part that stands in the slot gyro where a rate is read, unless another one is given
     readings: ClassVar[tuple[str, ...]] = (CURRENT, RATE)
     reads: ClassVar[dict[str, Option]] = {
@@ -50,16 +53,7 @@ class RateReading(RebalanceTest):
         if slot == "gyro" and not self.reads_rate and has_port(part, "rate", bench):
             self.set("reading", RATE)
 
-    def set(self, name: str, value: Any) -> None:
-        super().set(name, value)
-        if name == "reading":
-            self._arrange()
-
-    def _arrange(self) -> None:
-        """Give the system the slots and wires of what is read; those that were asked for stay."""
-        asked = [slot for slot in self.on_request if slot in self.slots]
-        for changed in ("slots", "wires", "channels", "noises", "assumed", "read_by", "windows"):
-            vars(self).pop(changed, None)
+    def arrange(self) -> None:
         if self.reads_rate:
             slots = on_table(table=self.slots["table"], gyro=Slot("RateGyro", self.rate_gyro))
             vars(self).update(
@@ -70,8 +64,6 @@ class RateReading(RebalanceTest):
                 read_by={},
                 assumed=(*TableTest.assumed, "gyro.scale?"),
             )
-        for slot in asked:
-            self.request(slot)
 
     def in_attitude(self, label: str, dwell: float, window: float) -> Plan:
         """Return a plan of one phase; the mount is the attitude itself, as the table stands level at angle 0."""

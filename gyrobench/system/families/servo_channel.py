@@ -17,11 +17,12 @@ from typing import Any, ClassVar
 from numpy.typing import ArrayLike
 
 from gyrobench import drift
+from gyrobench.system.families.arranged import Arranged
 from gyrobench.system.families.option_groups import GYRO_NOISES
 from gyrobench.system.families.table_test import ON_TABLE, sampled
 from gyrobench.system.part_files import has_port
 from gyrobench.system.part_values import PartValues
-from gyrobench.system.system import Option, Slot, System
+from gyrobench.system.system import Option, Slot
 
 OTHER = {"x": "y", "y": "x"}
 CHANNEL = {
@@ -92,13 +93,15 @@ def _renamed(ports: str, name: str, by: Any) -> str:
     return " " + " ".join(p for p in out if p)
 
 
-class ChannelTest(System):
+class ChannelTest(Arranged):
     """A test of a floated gyro on a table that takes a channel of a two-degree-of-freedom gyro as well.
 
     Its options hold :data:`CHANNEL`.  Not modelled: the rate across the table axis times the angle that the locking
     loop leaves, zero with its integral.
     """
 
+    arranged_by = "channel"
+    arranged = ("slots", "wires", "channels", "noises", "open", "windows")
     axis_parts: ClassVar[Mapping[str, str]]  # of the slots gyro and lock, unless others are given
     locked_columns: ClassVar[Mapping[str, str]] = {"locked": f"{LOCKED}.mean", "flagged_locked": f"{LOCKED}.flagged"}
 
@@ -130,17 +133,7 @@ class ChannelTest(System):
         if slot == "gyro" and not self.channel and has_port(part, "u_x", bench):
             self.set("channel", "x")
 
-    def set(self, name: str, value: Any) -> None:
-        super().set(name, value)
-        if name == "channel":
-            self._arrange()
-
-    def _arrange(self) -> None:
-        """Give the system the slots and wires of the channel; those that were asked for stay."""
-        asked = [slot for slot in self.on_request if slot in self.slots]
-        changed = ("slots", "wires", "channels", "noises", "open", "windows")
-        for name in changed:
-            vars(self).pop(name, None)
+    def arrange(self) -> None:
         c = self.channel
         if c in OTHER:
             slots = {n: s for n, s in self.slots.items() if n not in ("gyro", "sampler")}
@@ -157,8 +150,6 @@ class ChannelTest(System):
                 open=tuple(n.replace("gyro.i", f"gyro.i_{OTHER[c]}") for n in self.open),
                 windows=type(windows)(windows.watch, {**windows.columns, **self.locked_columns}),
             )
-        for slot in asked:
-            self.request(slot)
 
     def _port(self, name: str) -> str:
         """Return "gyro.u" as "gyro.u_x", "gyro.markov" as "gyro.markov_x"."""
