@@ -13,8 +13,7 @@ from xml.etree import ElementTree as ET
 from gyrobench.exchange.exposure import choose
 from gyrobench.exchange.gains import FACTOR, INPUT, OFFSET, OUTPUT, gain_fmu, gains_of
 from gyrobench.exchange.ssp_export import ExportError, experiment, for_system, prepare, recorded, slots_with_arrays
-from gyrobench.packaging.description import unit_attributes, unit_definitions
-from gyrobench.packaging.description3 import xml_text
+from gyrobench.packaging.description import unit_attributes, unit_definitions, xml_text
 from gyrobench.packaging.fmu import write_archive
 from gyrobench.system.fmu_variables import variables
 from gyrobench.system.recorded_units import recorded_units

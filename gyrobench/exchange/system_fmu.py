@@ -27,8 +27,8 @@ from gyrobench.exchange.ssp_export import ExportError, experiment, prepare, reco
 from gyrobench.exchange.system_source import Exposed, SystemSource, source_files
 from gyrobench.packaging import load_part
 from gyrobench.packaging.compiler import this_platform
-from gyrobench.packaging.description import EMPTY, add_variable, units
-from gyrobench.packaging.description3 import add_time, build_description, reference, xml_text
+from gyrobench.packaging.description import EMPTY, add_common, add_variable, units, xml_text
+from gyrobench.packaging.description3 import add_time, build_description, reference
 from gyrobench.packaging.description3 import add_variable as add_variable3
 from gyrobench.packaging.documentation import LICENCE, index_page, is_standard, licences
 from gyrobench.packaging.fmu import content_hash, guid_of, native_entries, write_archive
@@ -163,13 +163,8 @@ def _attributes(system: System, source: SystemSource, fmi: int) -> dict[str, str
 
 
 def _common(root: ET.Element, system: System, face: Any, extra: tuple[str, ...]) -> ET.Element:
-    """Add units, log category and default experiment; return the element of the variables."""
-    root.append(units(face.layout, *extra))
-    categories = ET.SubElement(root, "LogCategories")
-    ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
     inputs = any(s.section == "input" for s in face.layout)
-    ET.SubElement(root, "DefaultExperiment", experiment(system, inputs))
-    return ET.SubElement(root, "ModelVariables")
+    return add_common(root, units(face.layout, *extra), experiment(system, inputs))
 
 
 def _description2(system: System, source: SystemSource, guid: str) -> str:

@@ -82,24 +82,40 @@ def add_variable(
     if d.doc:
         attributes["description"] = d.doc
     v = ET.SubElement(parent, "ScalarVariable", attributes)
-    of_type: dict[str, str] = {}
-    derivative = s.section == "derivative"
-    if kind == "Real":
-        if d.quantity:
-            of_type["quantity"] = d.quantity
-        of_type |= unit_attributes(unit_name(s), s.start if s.section == "parameter" else None) | nominal([s], sizes)
-    if s.section in ("parameter", "input", "state"):
-        lo = d.min if d.min is not None else d.above
-        hi = d.max if d.max is not None else d.below
-        if kind != "Boolean" and lo is not None:
-            of_type["min"] = number(lo, d.type)
-        if kind != "Boolean" and hi is not None:
-            of_type["max"] = number(hi, d.type)
-        of_type["start"] = number(s.start, d.type)
-    if derivative:
+    of_type = of_values((s,), sizes)
+    if s.section == "derivative":
         state = next(x for x in cls.states if x.name == s.name[4:-1])
         of_type["derivative"] = str(state.reference + 1)
     ET.SubElement(v, kind, of_type)
+
+
+def of_values(elements: Sequence[Scalar], sizes: Mapping[str, float]) -> dict[str, str]:
+    """Return quantity, unit, nominal value, limits and start of a variable with these elements."""
+    s, found = elements[0], dict[str, str]()
+    d = s.decl
+    if d.type is float:
+        found |= {"quantity": d.quantity} if d.quantity else {}
+        found |= unit_attributes(unit_name(s), s.start if s.section == "parameter" else None) | nominal(elements, sizes)
+    if s.section in ("parameter", "input", "state"):
+        limits = {"min": d.above if d.min is None else d.min, "max": d.below if d.max is None else d.max}
+        found |= {n: number(x, d.type) for n, x in limits.items() if x is not None and d.type is not bool}
+        found["start"] = " ".join(number(e.start, d.type) for e in elements)
+    return found
+
+
+def add_common(root: ET.Element, units: ET.Element, experiment: Mapping[str, str]) -> ET.Element:
+    """Add units, log category and default experiment; return the element of the variables."""
+    root.append(units)
+    categories = ET.SubElement(root, "LogCategories")
+    ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
+    ET.SubElement(root, "DefaultExperiment", dict(experiment))
+    return ET.SubElement(root, "ModelVariables")
+
+
+def xml_text(root: ET.Element) -> str:
+    """Return the document, indented."""
+    ET.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
 def units(layout: Iterable[Scalar], *more: str) -> ET.Element:
@@ -185,17 +201,12 @@ def model_description(
         files = ET.SubElement(co, "SourceFiles")
         for name in ("fmi2.c", *c_units(cls)):
             ET.SubElement(files, "File", {"name": name})
-    root.append(units(cls.layout))
-    categories = ET.SubElement(root, "LogCategories")
-    ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
-    ET.SubElement(root, "DefaultExperiment", default_experiment(cls))
-    variables = ET.SubElement(root, "ModelVariables")
+    variables = add_common(root, units(cls.layout), default_experiment(cls))
     tunable = tuning(cls).tunable
     for s in cls.layout:
         add_variable(variables, cls, s, tunable, sizes)
     _structure(ET.SubElement(root, "ModelStructure"), cls, source)
-    ET.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+    return xml_text(root)
 
 
 def _structure(parent: ET.Element, cls: type[Component], source: PartCode) -> None:

@@ -15,15 +15,14 @@ from gyrobench.packaging.dependencies import dependencies
 from gyrobench.packaging.description import (
     ATTRIBUTES,
     EMPTY,
+    add_common,
     default_experiment,
     initial_references,
     licence,
-    nominal,
-    number,
+    of_values,
     summary,
-    unit_attributes,
-    unit_name,
     units,
+    xml_text,
 )
 from gyrobench.packaging.native_target import variables
 from gyrobench.packaging.source import PartCode
@@ -53,11 +52,6 @@ def build_description(identifier: str, beside: Iterable[str] = ()) -> str:
     return xml_text(root)
 
 
-def xml_text(root: ET.Element) -> str:
-    ET.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
-
-
 def array_name(s: Scalar) -> str:
     """Return the name of the variable that a scalar is an element of, or its own."""
     return f"der({s.decl.name})" if s.section == "derivative" else s.decl.name
@@ -83,21 +77,9 @@ def add_variable(
         attributes["description"] = s.decl.doc
     if initial:
         attributes["initial"] = initial
-    if kind == "Float64":
-        if s.decl.quantity:
-            attributes["quantity"] = s.decl.quantity
-        attributes |= unit_attributes(unit_name(s), s.start if s.section == "parameter" else None)
-        attributes |= nominal(array or (s,), sizes)
+    attributes |= of_values(array or (s,), sizes)
     if s.section == "derivative":
         attributes["derivative"] = reference(next(x for x in cls.states if x.name == s.name[4:-1]))
-    if s.section in ("parameter", "input", "state"):
-        lo = s.decl.min if s.decl.min is not None else s.decl.above
-        hi = s.decl.max if s.decl.max is not None else s.decl.below
-        if kind != "Boolean" and lo is not None:
-            attributes["min"] = number(lo, s.decl.type)
-        if kind != "Boolean" and hi is not None:
-            attributes["max"] = number(hi, s.decl.type)
-        attributes["start"] = " ".join(number(e.start, s.decl.type) for e in array or (s,))
     variable = ET.SubElement(parent, kind, attributes)
     for n in s.decl.shape if array else ():
         ET.SubElement(variable, "Dimension", {"start": str(n)})
@@ -135,11 +117,7 @@ def model_description3(cls: type[Component], guid: str, identifier: str, sizes: 
             "canHandleVariableCommunicationStepSize": "true",
         },
     )
-    root.append(units(cls.layout, "s"))
-    categories = ET.SubElement(root, "LogCategories")
-    ET.SubElement(categories, "Category", {"name": "logStatusError", "description": "why a call failed"})
-    ET.SubElement(root, "DefaultExperiment", default_experiment(cls))
-    declared = ET.SubElement(root, "ModelVariables")
+    declared = add_common(root, units(cls.layout, "s"), default_experiment(cls))
     add_time(declared, cls)
     every, tunable = variables(cls), tuning(cls).tunable
     for v in every:
