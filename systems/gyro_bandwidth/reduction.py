@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gyrobench.reduction.loops.curve_misfit import LEAST, alike
+from gyrobench.reduction.loops.curve_misfit import alike, misfit
 from gyrobench.reduction.loops.loop_curves import bode, curve
 from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table, told
 from gyrobench.reduction.loops.response_errors import GAIN_SLOPE, Sensitivity, left_out, not_stated, predicted_shifts
@@ -169,15 +169,15 @@ class Reduction(MeasureReduction):
             out.append(Sensitivity(source, math.sqrt(2.0) * u * u if source is COSINE else u, change))
         return out
 
-    def _neighbours_alike(self) -> bool:
-        """Return whether the residuals of neighbours, without which u of the points is not known, are alike."""
+    def _neighbours_alike(self) -> float:
+        """Return the probability that the residuals of neighbours are so alike by chance."""
         r, c = self.response, self.figures.curve
 
         def of(p: Array) -> Array:
             out: Array = c.at(r.f, p) / r.u
             return out
 
-        return alike(of, c.p, c.size, np.vstack([r.gain, r.phase]) / r.u - of(c.p)) < LEAST
+        return alike(of, c.p, c.size, np.vstack([r.gain, r.phase]) / r.u - of(c.p))
 
     def _doubts(self) -> None:
         found, points, c = self.found, self.points, self.figures.curve
@@ -185,18 +185,7 @@ class Reduction(MeasureReduction):
             at = ", ".join(f"{plain(f, 3)} Hz" for f in points.saturated)
             found.doubt("gyro.saturated", f"The gyro was beyond its range at {at}. Its gain there is too small. Take a "
                                           "smaller rate.")  # fmt: skip
-        if points.known and c.chi2 > c.dof + 4.0 * math.sqrt(2.0 * c.dof):
-            text = (
-                f"The curve does not fit the points: χ² = {plain(c.chi2, 3)} of {c.dof} degrees of freedom. u of the "
-                "figures is widened by its root. The gyro has a response of another shape, or points are wrong."
-            )
-            found.doubt("response.misfit", text)
-        elif not points.known and self._neighbours_alike():
-            text = (
-                "Neighbouring points lie on one side of the curve more often than noise explains, and their scatter is "
-                "no measure of their uncertainty. The gyro has a response of another shape, or points are wrong."
-            )
-            found.doubt("response.misfit", text)
+        found.doubt("response.misfit", misfit(points.known, c.chi2, c.dof, self._neighbours_alike))
         T, u = self._pure_delay()
         early = -T
         if self.run.measured and early > max(CLEAR * u, EARLY * float(self.figures.value[3])):

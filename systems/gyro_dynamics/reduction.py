@@ -14,7 +14,7 @@ import numpy as np
 
 from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.reduction.estimation.uncertainty import NORMAL
-from gyrobench.reduction.loops.curve_misfit import LEAST, alike
+from gyrobench.reduction.loops.curve_misfit import alike, misfit
 from gyrobench.reduction.loops.loop_curves import bode, curve, trace
 from gyrobench.reduction.loops.loop_reduction import MeasureReduction
 from gyrobench.reduction.loops.loop_toolkit import ARCMIN, Account, Array, Point, ReductionError, Table, told
@@ -240,8 +240,8 @@ class Reduction(MeasureReduction):
             text = "Sines and steps give different time constants. A reading with a filter of its own does this."
             self.found.warn("dynamics.steps", text)
 
-    def _neighbours_alike(self) -> bool:
-        """Return whether the residuals of neighbours, without which u of the points is not known, are alike."""
+    def _neighbours_alike(self) -> float:
+        """Return the probability that the residuals of neighbours are so alike by chance."""
         assert self.response is not None and self.figures is not None
         r, p = self.response, self.figures.fit.p
         top = 2.0 * math.pi * float(r.f[-1])
@@ -250,7 +250,7 @@ class Reduction(MeasureReduction):
             ratio = np.log(response(p, r.f, r.output) / r.value) / r.u
             return np.vstack([ratio.real, ratio.imag])
 
-        return alike(of, p, np.array([1.0, 1.0, top**-2, top**-3])[: p.size], of(p)) < LEAST
+        return alike(of, p, np.array([1.0, 1.0, top**-2, top**-3])[: p.size], of(p))
 
     def _doubts(self) -> None:
         found, points = self.found, self.points
@@ -259,15 +259,5 @@ class Reduction(MeasureReduction):
             found.doubt("gyro.saturated", f"The pickoff was beyond its range at {at}. Take a smaller angle.")
         found.reasons += not_stated(self.run, self.by, self.shown)
         fit = self.figures.fit if self.figures else None
-        if fit and points.known and fit.chi2 > fit.dof + 4.0 * math.sqrt(2.0 * fit.dof):
-            text = (
-                f"The curve does not fit the points: χ² = {plain(fit.chi2, 3)} of {fit.dof} degrees of freedom. u of "
-                "the figures is widened by its root. The gyro has dynamics of another kind, or points are wrong."
-            )
-            found.doubt("response.misfit", text)
-        elif fit and not points.known and self._neighbours_alike():
-            text = (
-                "Neighbouring points lie on one side of the curve more often than noise explains, and their scatter is "
-                "no measure of their uncertainty. The gyro has dynamics of another kind, or points are wrong."
-            )
-            found.doubt("response.misfit", text)
+        if fit:
+            found.doubt("response.misfit", misfit(points.known, fit.chi2, fit.dof, self._neighbours_alike))

@@ -17,6 +17,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.sentences import plain
 
 LEAST = 1e-3  # p below which the residuals of neighbours are alike: one clean record in a thousand
 STEP = 1e-5  # of the size of an unknown, for the derivatives of the curve
@@ -41,3 +42,21 @@ def alike(curve: Callable[[Array], Array], p: Array, size: Array, left: Array) -
     if not (variance > 0.0 and float(r @ r) > 0.0):
         return 1.0
     return 0.5 * math.erfc(-(float(r @ D @ r) / float(r @ r) - mean) / math.sqrt(2.0 * variance))
+
+
+def misfit(known: bool, chi2: float, dof: int, neighbours: Callable[[], float]) -> str:
+    """Return that a curve does not fit points of known u, or others whose neighbours are alike; "" where it does.
+
+    neighbours: what :func:`alike` says of them.
+    """
+    if known and chi2 > dof + 4.0 * math.sqrt(2.0 * dof):
+        found = (
+            f"The curve does not fit the points: χ² = {plain(chi2, 3)} of {dof} degrees of freedom. u of the figures "
+        )
+        found += "is widened by its root."
+    elif not known and neighbours() < LEAST:
+        found = "Neighbouring points lie on one side of the curve more often than noise explains, and their scatter is "
+        found += "no measure of their uncertainty."
+    else:
+        return ""
+    return f"{found} The gyro has a response of another shape, or points are wrong."
