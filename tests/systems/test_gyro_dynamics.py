@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commanding import Command
 from scipy import signal
 
 from gyrobench.engine.session import Session
@@ -200,6 +201,15 @@ def test_nothing_stated_nothing_passes(tmp_path: Path) -> None:
     assert {"type_b.unstated", "arrangement.unstated"} <= {r.id for r in result.reasons}
     gain, lag = (r for r in result.reasons if r.id == "type_b.unstated" and r.names)
     assert "g" in gain.names and "tau" in lag.names and {gain.text, lag.text} <= set(result.summary)
+
+
+@pytest.mark.parametrize("said", ["note = x", "u_gain = 1e-3;u_lag = 1e-6s"])
+def test_what_is_stated_and_left_out_in_chinese(command: Command, tmp_path: Path, said: str) -> None:
+    """A report of which a sentence or a source has no translation is not written."""
+    measured(tmp_path, SINES, sines(), said)
+    words = ("reduce", NAME, "--data", tmp_path / "r.csv", "--language", "zh", "--out", tmp_path / "out")
+    code, _, err = command(*words, pages=True, figures=False)
+    assert code == 0, err
 
 
 @pytest.mark.parametrize(
