@@ -71,7 +71,12 @@ def noise_coefficients_table(result: DriftTestResult, record: Record, residual: 
 def _taken(t: Treated) -> str:
     """Return what was taken out before the model, in words."""
     level = len(t.changes) - len(t.pulses)
-    counts = ((len(t.lines), "line"), (level, "step or slow change"), (len(t.pulses), "pulse"), (t.wild.size, "wild value"))
+    counts = (
+        (len(t.lines), "line"),
+        (level, "step or slow change"),
+        (len(t.pulses), "pulse"),
+        (t.wild.size, "wild value"),
+    )
     several = {"step or slow change": "steps or slow changes"}
     return ", ".join(f"{n} {word if n == 1 else several.get(word, f'{word}s')}" for n, word in counts if n)
 
