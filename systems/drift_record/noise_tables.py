@@ -10,6 +10,7 @@ import numpy as np
 from gyrobench.reduction.noise_model.agreement import ENOUGH
 from gyrobench.reduction.noise_model.constancy import changing
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
+from gyrobench.reduction.noise_model.pulses import MOST
 from gyrobench.reduction.series.channel_units import ChannelUnits
 from gyrobench.reduction.series.motion import TIMES
 from gyrobench.reduction.series.noise_coefficients import Estimate
@@ -257,9 +258,10 @@ def pulses_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
     each = sorted((time[min(at, time.size - 1)], length, size / si, u / si) for at, length, size, u in noise.pulses)
     said = ", ".join(f"{number(size, u)} {unit} at {number(t)} s" for t, _, size, u in each)
     longest = number(max(length for _, length, _, _ in each))
+    more = " There may be more of them, which N holds." if len(each) >= MOST else ""
     return (
         f"Pulses of {said}, within {longest} s, which no noise of the rest makes, are taken out before the model; left "
-        "in, N takes them for its random walk. Look for what touched the instrument."
+        f"in, N takes them for its random walk. Look for what touched the instrument.{more}"
     )
 
 

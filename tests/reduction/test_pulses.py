@@ -10,7 +10,7 @@ from scipy import fft
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.fit import fit_noise
-from gyrobench.reduction.noise_model.pulses import pulse
+from gyrobench.reduction.noise_model.pulses import MOST, pulse
 from gyrobench.reduction.series.channel_units import units_of
 from systems.drift_record.noise_tables import pulses_text
 
@@ -60,3 +60,16 @@ def test_turns_that_no_sample_shows_are_no_random_walk(seed: int) -> None:
 
 def test_noise_has_none() -> None:
     assert [fit_noise(record(seed, {}), 1.0, means=False).pulses for seed in range(3, 7)] == [[]] * 4
+
+
+def test_more_of_them_than_are_taken_out() -> None:
+    """Thirty bumps of three standard deviations, 40 samples each: ten are taken out, N holds the others, and that is said."""
+    rng = np.random.default_rng([77, 1])
+    x = rng.normal(size=20_000)
+    for at in rng.choice(19_900, 30, replace=False):
+        x[at : at + 40] += 3.0 * np.hanning(40)
+    model = fit_noise(x, 1.0, means=False)
+    assert len(model.pulses) == MOST
+    assert pulses_text(model, np.arange(x.size), units_of("rad/s")).endswith(
+        "There may be more of them, which N holds."
+    )

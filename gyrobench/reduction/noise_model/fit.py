@@ -42,7 +42,7 @@ from gyrobench.reduction.noise_model.one_curve import steep_fall, weak_start
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, size_of, spectrum, split
 from gyrobench.reduction.noise_model.posterior import NONE, Cloud, density_of_walk, quantile, resampled, shown, weighted
 from gyrobench.reduction.noise_model.processes import LIKELY, process
-from gyrobench.reduction.noise_model.pulses import WIDTHS, Pulse, pulse
+from gyrobench.reduction.noise_model.pulses import MOST, WIDTHS, Pulse, pulse
 from gyrobench.reduction.noise_model.search import ModelSearch, search, search_again
 from gyrobench.reduction.noise_model.sensor_filters import DIGITAL, MEANS, Grid
 from gyrobench.reduction.noise_model.slow_changes import LevelChange, Settling, Swing, settling, swing
@@ -57,7 +57,7 @@ WORTH = 0.01  # of the most probable model with a term: weight of one whose uppe
 SLOWEST = math.log(10.0)  # logarithm of the record over tau of a process that drifts as a walk within it
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 FAST = ("N", "Q")  # coefficients that a band too weak to be found counts as
-CHANGES = {LevelStep: 5, Pulse: 5, Settling: 1, Swing: 2}  # at most
+CHANGES = {LevelStep: 5, Pulse: MOST, Settling: 1, Swing: 2}  # at most
 RATIO = 8.0  # of the likelihood ratio of a step or a pulse, above 2 log n (widths)
 SLOW, SEEN = 24.0, 9.0  # of that of a slow change: some ten of them differ; and before the models are fitted again
 LEAK = 10.0  # ordinates of mean power

@@ -19,6 +19,7 @@ from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.steps import EDGE, precision
 
 WIDTHS = tuple(8 * 2**k for k in range(7))  # samples: a shorter one is a wild sample
+MOST = 10  # pulses of a record that are taken out
 PART = 20  # of a stretch, at most: a longer one is a change of the level
 
 
