@@ -63,7 +63,7 @@ def test_noise_has_none() -> None:
 
 
 def test_more_of_them_than_are_taken_out() -> None:
-    """Thirty bumps of three standard deviations, 40 samples each: ten are taken out, N holds the rest, which is said."""
+    """Thirty bumps of three rms of a sample, 40 samples each: ten are taken out, N holds the rest, as is said."""
     rng = np.random.default_rng([77, 1])
     x = rng.normal(size=20_000)
     for at in rng.choice(19_900, 30, replace=False):
