@@ -31,10 +31,12 @@ def weak_start(found: ModelSearch, at: Fitted) -> float:
     the first is left out, as in steep_fall.
     """
     omega, count = found.data.grid.omega, found.data.all_count
-    _, excess = found.excess(at)
+    S, _ = found.excess(at)
+    # the errors of the end angles are two numbers of each stretch, which may be small
+    S = S - 2.0 * float(found.data.angle(at.model, at.p)) * found.data.all_ends**2
     order = np.argsort(omega)
     order = order[omega[order] > 1.5 * math.pi / float(found.data.n.max())]
-    c, total = np.cumsum(count[order]), np.cumsum((excess + count)[order])
+    c, total = np.cumsum(count[order]), np.cumsum((found.data.all_power / S)[order])
     ends = np.flatnonzero((c >= START) & (c <= c[-1] / START))
     least = float(np.min(chi2.cdf(total[ends], c[ends]), initial=1.0))
     return min(1.0, least * math.log2(c[-1])) if ends.size else 1.0  # independent lengths: about one an octave
