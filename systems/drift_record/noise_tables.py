@@ -10,7 +10,7 @@ import numpy as np
 from gyrobench.reduction.noise_model.agreement import ENOUGH
 from gyrobench.reduction.noise_model.constancy import changing
 from gyrobench.reduction.noise_model.noise_model import NoiseModel
-from gyrobench.reduction.noise_model.pulses import MOST
+from gyrobench.reduction.noise_model.rate_pulses import MOST
 from gyrobench.reduction.series.channel_units import ChannelUnits
 from gyrobench.reduction.series.motion import TIMES
 from gyrobench.reduction.series.noise_coefficients import Estimate

@@ -10,7 +10,7 @@ from scipy import fft
 
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.fit import fit_noise
-from gyrobench.reduction.noise_model.pulses import MOST, pulse
+from gyrobench.reduction.noise_model.rate_pulses import MOST, pulse
 from gyrobench.reduction.series.channel_units import units_of
 from systems.drift_record.noise_tables import pulses_text
 

@@ -42,7 +42,7 @@ from gyrobench.reduction.noise_model.one_curve import steep_fall, weak_start
 from gyrobench.reduction.noise_model.ordinates import Model, Ordinates, allan, joined, size_of, spectrum, split
 from gyrobench.reduction.noise_model.posterior import NONE, Cloud, density_of_walk, quantile, resampled, shown, weighted
 from gyrobench.reduction.noise_model.processes import LIKELY, process
-from gyrobench.reduction.noise_model.pulses import MOST, WIDTHS, Pulse, pulse
+from gyrobench.reduction.noise_model.rate_pulses import MOST, WIDTHS, Pulse, pulse
 from gyrobench.reduction.noise_model.search import ModelSearch, search, search_again
 from gyrobench.reduction.noise_model.sensor_filters import DIGITAL, MEANS, Grid
 from gyrobench.reduction.noise_model.slow_changes import LevelChange, Settling, Swing, settling, swing

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy import fft, optimize
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.noise_model.pulses import Pulse
+from gyrobench.reduction.noise_model.rate_pulses import Pulse
 from gyrobench.reduction.noise_model.steps import LevelStep, precision
 
 MOST = 8192  # ordinates: the others have nothing of a change that takes a thousandth of the stretch or more

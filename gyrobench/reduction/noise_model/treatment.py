@@ -21,7 +21,7 @@ from scipy import fft, special
 from gyrobench.arrays import Array
 from gyrobench.reduction.noise_model.gap_completion import Completed, complete, mostly_known
 from gyrobench.reduction.noise_model.ordinates import SHORTEST, Ordinates
-from gyrobench.reduction.noise_model.pulses import Pulse
+from gyrobench.reduction.noise_model.rate_pulses import Pulse
 from gyrobench.reduction.noise_model.sines import sines_of, standing
 from gyrobench.reduction.noise_model.slow_changes import LevelChange, Settling, Swing, without
 from gyrobench.reduction.noise_model.steps import LevelStep

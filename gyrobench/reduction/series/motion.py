@@ -20,6 +20,7 @@ BLOCK, LAG = 32, 8  # samples
 SECONDS = 0.5  # of a block at least: a hand moves at some hertz
 TIMES = 8.0  # of 10⁴ blocks of a random walk, which differ most, the largest is 4
 MOST = 0.2  # of a record, that may be left out
+ROUNDING = 1e-6  # of the largest: differences of whole counts over a step are as even as their last digits
 FEW = 10  # blocks of an end that was cut off by a motion
 
 
@@ -32,6 +33,7 @@ def moved(channels: Mapping[str, Array] | Sequence[Array], step: float) -> NDArr
     found = np.zeros(blocks, dtype=bool)
     for x in values:
         scatter = _scatter(x[: blocks * size].reshape(blocks, size), size * LAG // BLOCK)
+        scatter[scatter < ROUNDING * np.nanmax(scatter, initial=0.0)] = 0.0
         known = scatter[scatter > 0.0]  # of coarse steps most blocks may have none
         usual = float(np.nanmedian(scatter)) or (float(known.min()) if known.size else math.inf)
         found |= scatter > TIMES * usual
