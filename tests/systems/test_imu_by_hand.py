@@ -319,7 +319,7 @@ def test_a_proposed_map_reads_other_names_and_numbered_positions(tmp_path: Path)
     text = "\n".join(",".join(f"{v:.9g}" for v in row) for row in rows.tolist())
     path.write_text(f"{HEAD}{','.join(heads)}\n{text}\n", encoding="utf-8")
     text, problems = write_columns(path, "imu_positions", None)
-    assert not problems and "# Not used: position" in text and '# attitudes = "unknown"' in text
+    assert not problems and "# Not used: position" in text and '\nattitudes = "unknown"' in text
     (tmp_path / "map.toml").write_text(text.replace("# Not used", '[columns.position]\nfrom = "position"\n#'))
     translate(path, read_map(tmp_path / "map.toml"), tmp_path / "columns.csv")
     read = record(tmp_path / "columns.csv", attitudes="unknown", latitude="40.10704566deg", gravity="9.805m/s2")
