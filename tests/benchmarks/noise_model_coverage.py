@@ -45,6 +45,7 @@ _a = np.real(np.poly(np.exp(np.roots([1.0, 0.5, 0.25]))))
 POLES = ([_a.sum()], _a)  # recursive, natural frequency and damping 0.5
 TRUTHS: dict[str, dict[str, Any]] = {
     "white noise": {"N": 1.0},
+    "a walk beside it": {"N": 1.0, "K": 0.01},
     "low-pass, one process, walk": {"N": 1.0, "lag": 0.56, "markov": [(0.05, 200.0)], "K": 3e-4},
     "one process": {"N": 1.0, "markov": [(0.0444, 270.0)]},
     "mean of 3, three processes": {"N": 1.0, "mean": 3, "markov": [(0.3, 12.0), (0.15, 150.0), (0.15, 1500.0)]},
@@ -186,7 +187,7 @@ def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str
             for term in "NBKRQ":
                 e, true = model[term], walk if term == "K" else truth.get(term, 0.0)
                 inside[term].append(e.low <= true <= e.high)
-                if e.determined:
+                if e.determined and true:
                     inside[f"{term} stated"].append(inside[term][-1])
                 if not inside[term][-1]:
                     missed.append(f"{term} {i} ({n} {' '.join(these)}: {e.low:.4g} to {e.high:.4g})")
