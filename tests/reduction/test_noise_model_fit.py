@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -391,3 +392,15 @@ def test_long_stretches_have_a_length_of_small_factors() -> None:
     rate = np.zeros(100_003)
     assert treatment.stretches_of(rate) == [slice(0, 100_000)]
     assert treatment.stretches_of(rate[:99_991]) == [slice(0, 99_991)]
+
+
+def test_degrees_of_freedom_of_long_averaging_times_count_every_start() -> None:
+    """Above 1024 samples a deviation is summed from every second, fourth ... start, of as many degrees of freedom: by
+    the spectrum of white noise those of its power law.  They came out 2, 4 and 8 times too small.
+    """
+    own = deviations(np.random.default_rng(3).normal(size=65_536), 1.0)["allan"]
+    own = replace(own, deviation=own.tau**-0.5)
+    white = (NoiseTerm("white"),), np.array([0.0])
+    ratio = with_spectrum(own, squares_of_spectrum(own.tau, *white)).edf / own.edf
+    long = (own.tau >= 64.0) & (own.tau <= 6_553.0) & (own.exponent == 0)
+    assert np.count_nonzero(own.tau[long] > 1024.0) >= 2 and np.all(ratio[long] > 0.7)

@@ -40,7 +40,8 @@ MISSING = 0.01  # part of a mean over tau that may be missing
 class Deviation:
     """One deviation over tau, each array (k,): tau in s, the others in the unit of the rate.
 
-    low, high: interval of 95 %; edf: equivalent degrees of freedom; count: differences summed up; exponent: alpha of
+    low, high: interval of 95 %; edf: equivalent degrees of freedom; count: differences from every sample on (of long
+    tau from every stride-th, which stand for all); exponent: alpha of
     the power law S ~ f^alpha that the edf are for (0 white rate, -1 flicker, -2 random walk, 2 white angle).
     """
 
@@ -227,7 +228,7 @@ class DeviationAccumulator:
         alpha = _exponents(kind, tau, dev, count / m)
         edf = np.array([degrees_of_freedom(kind, *row) for row in zip(m, count, alpha, strict=True)])
         low, high = (dev * np.sqrt(edf / special.chdtri(edf, p)) for p in (0.025, 0.975))
-        return Deviation(kind, tau, dev, low, high, edf, count.astype(np.int64), alpha)
+        return Deviation(kind, tau, dev, low, high, edf, (stride * count).astype(np.int64), alpha)
 
 
 def deviations(
