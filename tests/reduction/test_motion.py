@@ -30,7 +30,7 @@ def noise(kind: str) -> Array:
 
 @pytest.mark.parametrize("kind", ["white", "walk", "angle", "wild", "steps", "line", "warm-up", "coarse", "gaps"])
 def test_noise_and_its_faults_are_no_motion(kind: str) -> None:
-    assert not moved([noise(kind)], STEP).any()
+    assert not moved({"x": noise(kind)}, STEP).any()
 
 
 def test_taken_up_knocked_and_put_down() -> None:
@@ -49,5 +49,5 @@ def test_taken_up_knocked_and_put_down() -> None:
 
 def test_a_record_that_is_louder_for_a_third_of_it() -> None:
     """Thirty times from 0.7 on, blocks 560 to 800: found, with the block beside them, and too much to leave out."""
-    found = moved([noise("white") * np.where(np.arange(N) < 0.7 * N, 1.0, 30.0)], STEP)
+    found = moved({"x": noise("white") * np.where(np.arange(N) < 0.7 * N, 1.0, 30.0)}, STEP)
     assert found.mean() == pytest.approx(241 / 800) and found.mean() > MOST

@@ -9,7 +9,7 @@ for leaving out: it is no record at rest, or one whose noise changes.  [DRIFT-NO
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +24,13 @@ ROUNDING = 1e-6  # of the largest: differences of whole counts over a step are a
 FEW = 10  # blocks of an end that was cut off by a motion
 
 
-def moved(channels: Mapping[str, Array] | Sequence[Array], step: float) -> NDArray[np.bool_]:
+def moved(channels: Mapping[str, Array], step: float) -> NDArray[np.bool_]:
     """Return the samples (n,) in which one channel or more moves far beyond its noise; step: s."""
-    values = list(channels.values()) if isinstance(channels, Mapping) else list(channels)
-    n = values[0].size
+    n = next(iter(channels.values())).size
     size = max(BLOCK, math.ceil(SECONDS / step))
     blocks = n // size
     found = np.zeros(blocks, dtype=bool)
-    for x in values:
+    for x in channels.values():
         scatter = _scatter(x[: blocks * size].reshape(blocks, size), size * LAG // BLOCK)
         scatter[scatter < ROUNDING * np.nanmax(scatter, initial=0.0)] = 0.0
         known = scatter[scatter > 0.0]  # of coarse steps most blocks may have none

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
 from gyrobench.system.system import System
 
 
-class Arranged(System):
+class Arranged(System, ABC):
     """A test that is arranged anew when the option ``arranged_by`` is set; what was asked for stays.
 
     arranged: the attributes that follow from its value.
@@ -27,6 +28,6 @@ class Arranged(System):
         for slot in asked:
             self.request(slot)
 
+    @abstractmethod
     def arrange(self) -> None:
         """Give the system the slots and wires of the value that is set."""
-        raise NotImplementedError
