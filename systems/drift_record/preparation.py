@@ -167,8 +167,7 @@ def prepare(
     there = np.isfinite(rate)
     share = float(np.var(taken[there]) / (np.var(rate[there]) or 1.0)) if regressions else None
     try:
-        noise = fit_noise(left, columns.step, means, remove_lines, wild, rate)
-        noise = replace(noise, alike=alike, restless=columns.restless)
+        noise = fit_noise(left, columns.step, means, remove_lines, wild, rate, alike, columns.restless)
         model = describe(noise.longest[1], columns.step)
     except SeriesError as error:
         raise ReductionError([f"column '{name}': {error}"]) from None

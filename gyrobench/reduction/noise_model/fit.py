@@ -89,11 +89,14 @@ def fit_noise(
     remove_lines: bool = True,
     find_wild: bool = True,
     raw: Array | None = None,
+    alike: float = 0.0,
+    restless: float = 0.0,
 ) -> NoiseModel:
     """Return the noise model of a rate (n,), NaN where a sample is missing.
 
     means: a sample is the mean over tau0 (a difference of angles), not the rate at an instant.  raw: the record before
-    anything was taken out of it, whose deviation the model is held against; the rate itself unless given.
+    anything was taken out of it, whose deviation the model is held against; the rate itself unless given.  alike,
+    restless: what is known of the record beside the samples, see :class:`NoiseModel`.
     Raises SeriesError for a record that is too short or constant, ValueError for tau0 that is not positive.
     """
     if not tau0 > 0.0:
@@ -121,6 +124,8 @@ def fit_noise(
         agreements=(whole.scaled(scale.size, tau0), clean.scaled(scale.size, tau0)),
         with_wild={n: v * scale.units[n] for n, v in _with_wild(treated, at, found, means).items()},
         models=len(found.seen),
+        alike=alike,
+        restless=restless,
         chances={"filtered": filter_probability(clouds), "steep": steep_fall(found, at), "weak": weak_start(found, at)},
     )
 

@@ -24,6 +24,7 @@ from gyrobench.reduction.series.row_pattern import rows_of_a_slower_record
 
 CALLED = {"N": "white", "B": "flicker", "K": "walk", "Q": "quantization"}
 ABSENT = 0.025  # probability of its absence below which a term is determined
+ALIKE = 0.9  # share of samples equal to the one before, from which on the others are told by the place of the step
 
 
 @dataclass(frozen=True)
@@ -57,9 +58,6 @@ class Minimum:
     deviation: Estimate
     tau: Estimate
     reached: bool
-
-
-ALIKE = 0.9  # share of samples equal to the one before, from which on the others are told by the place of the step
 
 
 @dataclass(frozen=True)
@@ -114,8 +112,8 @@ class NoiseModel:
     with_wild: dict[str, float]
     models: int
     chances: dict[str, float]
-    alike: float = 0.0
-    restless: float = 0.0
+    alike: float
+    restless: float
 
     def __getitem__(self, name: str) -> Estimate:
         """Return a coefficient."""
