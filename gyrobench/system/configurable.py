@@ -87,7 +87,10 @@ class Option:
 
 
 def lacking_methods(cls: type) -> list[str]:
-    """Return the methods that a class has not, though its base leaves them to it, as sentences."""
+    """Return the methods that a class has not, though its base leaves them to it, as sentences.
+
+    Families mark them and are no ``ABC``, whose refusal at the making would come before this sentence.
+    """
     lacking = [n for n in dir(cls) if getattr(getattr(cls, n), "__isabstractmethod__", False)]
     return [f"{cls.__name__} has no {n}(), which its family leaves to the test" for n in lacking]
 

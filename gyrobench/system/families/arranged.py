@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from typing import Any, ClassVar
 
 from gyrobench.system.system import System
 
 
-class Arranged(System, ABC):
+class Arranged(System):
     """A test that is arranged anew when the option ``arranged_by`` is set; what was asked for stays.
 
     arranged: the attributes that follow from its value.
