@@ -15,7 +15,15 @@ import numpy as np
 from gyrobench.reduction.loops.curve_misfit import alike, misfit
 from gyrobench.reduction.loops.loop_curves import bode, curve
 from gyrobench.reduction.loops.loop_toolkit import Account, Array, MeasureReduction, Point, ReductionError, Table, told
-from gyrobench.reduction.loops.response_errors import GAIN_SLOPE, Sensitivity, left_out, not_stated, predicted_shifts
+from gyrobench.reduction.loops.response_errors import (
+    GAIN_SLOPE,
+    TOGETHER,
+    Sensitivity,
+    left_out,
+    not_stated,
+    predicted_shifts,
+    together,
+)
 from gyrobench.reduction.setup.sources import COSINE, READING_GAIN, READING_LAG, TIME_BASE, Source
 from gyrobench.reduction.toolkit import Reason, plain
 from gyrobench.units import DEG
@@ -85,8 +93,11 @@ class Reduction(MeasureReduction):
     def _report(self) -> None:
         found, points, response, curve_of = self.found, self.points, self.response, self.figures.curve
         highest = float(points.f[-1])
-        truth = true_values(self.run, highest)
         by = self._sensitivities()
+        known = [k for k in range(len(FIGURES)) if math.isfinite(self.figures.value[k])]
+        own = [(k, FIGURES[k][0], *FIGURES[k][2:], float(self.figures.u[k])) for k in known]
+        shared = together(self.run, by, own)
+        truth = true_values(self.run, highest, shared)
         for k, (name, meaning, unit, scale) in enumerate(FIGURES):
             value = float(self.figures.value[k])
             if not math.isfinite(value):
@@ -94,11 +105,10 @@ class Reduction(MeasureReduction):
                 continue
             u = math.hypot(float(self.figures.u[k]), *(s.share(k) for s in by))
             true = float(truth[k]) if truth is not None and math.isfinite(truth[k]) else None
-            found.measure(name, meaning, unit, value, u, scale=scale, truth=true)
+            of = TOGETHER if any(name in names for names in shared.values()) else ""
+            found.measure(name, meaning + of, unit, value, u, scale=scale, truth=true)
             found.coefficients[-1] = replace(found.coefficients[-1], u_a=float(self.figures.u[k]) / scale)
             found.budget += [s.line(name, unit, scale, k) for s in by if s.u > 0.0]
-        known = [k for k in range(len(FIGURES)) if math.isfinite(self.figures.value[k])]
-        own = [(k, FIGURES[k][0], *FIGURES[k][2:], float(self.figures.u[k])) for k in known]
         shifts = predicted_shifts(self.run, by, own)
         found.tables += [shifts] if shifts else []
         found.reasons += not_stated(self.run, by, own)
@@ -128,11 +138,13 @@ class Reduction(MeasureReduction):
     def _delayed(self) -> str:
         T, u = (x * 1e3 for x in self._pure_delay())
         held = self.response.held * 1e3
-        samples = f", {plain(T / held, 3)} samples of the gyro" if held else ""
+        T = T if abs(T) > 0.1 * u else 0.0
+        sign = "−" if T < 0.0 else ""
+        samples = f", {sign}{plain(abs(T / held), 3)} samples of the gyro" if held else ""
         return (
-            f"{plain(T, 3)} ms of the delay (u = {plain(u)} ms{samples}) are no pole's, whose gain would show: the "
-            "gyro's own, or those of a late reading."
-        ).replace("-", "−")
+            f"{sign}{plain(abs(T), 3)} ms of the delay (u = {plain(u)} ms{samples}) are no pole's, whose gain would "
+            "show: the gyro's own, or those of a late reading."
+        )
 
     def _table(self) -> Table:
         r, fitted = self.response, self.figures.curve.at(self.response.f)

@@ -8,13 +8,14 @@ period T and holds it is late by T/2 more, sinc(f T) of the amplitude.  [GYRO-VI
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
 
 from gyrobench.arrays import Array
 from gyrobench.record.run_document import RunDocument
+from gyrobench.reduction.setup.sources import READING_GAIN, READING_LAG
 
 from .response import Logarithm, hold, read_off
 
@@ -22,10 +23,25 @@ MEANS = ("GyroRate", "GyroFog", "GyroLaser")
 FILTERED = ("GyroMems", "GyroVibratory", "GyroVibratoryCarrier")
 
 
-def true_values(run: RunDocument, highest: float) -> Array | None:
-    """Return K, f3, f90, delay, order of the gyro of a run; None where its response is not known in closed form."""
+def true_values(run: RunDocument, highest: float, read: Collection[str] = ()) -> Array | None:
+    """Return K, f3, f90, delay, order of the gyro of a run; None where its response is not known in closed form.
+
+    read: sources of the table reading (``READING_GAIN.id``, ``READING_LAG.id``) that the response is to have.
+    """
     of = response_of(run)
-    return None if of is None else read_off(of, highest)
+    if of is None:
+        return None
+    gain, lag = (
+        float(run.parameters.get(name, 0.0)) if source.id in read else 0.0
+        for name, source in (("table.read_gain", READING_GAIN), ("table.read_lag", READING_LAG))
+    )
+
+    def chain(f: Array) -> Array:  # rate_read = (1 + gain) (rate - lag acc)
+        reading = (1.0 + gain) * (1.0 - 2j * np.pi * f * lag)
+        out: Array = of(f) - np.vstack([np.log(np.abs(reading)), np.angle(reading)])
+        return out
+
+    return read_off(chain, highest)
 
 
 def response_of(run: RunDocument) -> Logarithm | None:

@@ -1,13 +1,15 @@
 """How often the 95 % intervals of turn-ons contain the true value, of records written straight from the equations.
 
-    python tests/benchmarks/turn_on_coverage.py [one] [two] [hardly] [turning] [signs] [--runs 300] [--population]
+    python tests/benchmarks/turn_on_coverage.py [one] [two] [hardly] [turning] [signs] [drawn] [--runs 300]
+        [--population]
 
 y = w + b_day + b_on + sum A m(t, tau) + E w m(t, tau_E) + noise, white or of the population for which intervals are
 made (gyrobench.reduction.estimation.noise), over 1 to 2 days of 3 to 5 turn-ons of 300 s in
 readings of 5 s; no part, no simulation.  one, two: exponentials of 1 to 5 deg/h, tau of 10 to 40 s and four times that;
 hardly: the second within +-0.5 deg/h; turning: two, the scale factor with a third, at a rate in both senses; signs:
-two of sizes of either sign.  Where one is found of two, A stands for their sum and tau for the time after which 1/e of
-it is left.
+two of sizes of either sign; drawn: the warm-ups for which intervals are made, one to three exponentials, ln tau even
+from a reading to twice a turn-on, one size of 1 to 5 deg/h, the others by chance with it as rms.  Where one is found of
+two, A stands for their sum and tau for the time after which 1/e of it is left.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ from systems.turn_on_repeatability.reduction import Reduction, TurnOnSetup
 from systems.turn_on_repeatability.warming import Warming, means
 
 DPH = math.pi / 648000.0
-KINDS = ("one", "two", "hardly", "turning", "signs")
+KINDS = ("one", "two", "hardly", "turning", "signs", "drawn")
 LIMIT, READING, EACH = 0.3, 5.0, 60  # deg/h, s
 
 
@@ -36,6 +38,10 @@ def written(rng: np.random.Generator, kind: str, population: bool = False) -> tu
     size, taus = np.array([rng.uniform(1.0, 5.0), second]), np.array([tau, 4.0 * tau])
     if kind == "signs":
         size *= rng.choice([-1.0, 1.0], 2)
+    if kind == "drawn":
+        more = int(rng.integers(0, 3))
+        size = rng.permutation(rng.choice([-1.0, 1.0]) * np.append(size[:1], size[0] * rng.normal(size=more)))
+        taus = np.sort(np.exp(rng.uniform(math.log(READING), math.log(2.0 * EACH * READING), 1 + more)))
     white = 0.18 / math.sqrt(READING) * rng.uniform(0.2, 5.0)  # 0.003 deg/sqrt(h) = 0.18 deg/h sqrt(s)
     on, between, E = rng.uniform(0.0, 0.5), rng.uniform(0.0, 0.5), rng.uniform(1e-4, 1e-3)
     n = days * of_day

@@ -154,32 +154,6 @@ def test_closed_forms_come_back(part: str, given: dict[str, Any], expected: tupl
             assert c[name].estimate == pytest.approx(c[name].truth, rel=1e-3), name
 
 
-@pytest.fixture(scope="module")
-def wrong() -> Result:
-    """A reading 1 % too large and 0.2 ms late."""
-    return reduced("gyro_vibratory", {**SHORT, **QUIET, "table.read_gain": 0.01, "table.read_lag": 2e-4, "u_gain": 0.01,
-                                      "u_lag": 2e-4})  # fmt: skip
-
-
-@pytest.mark.long
-def test_set_up_errors_do_what_is_predicted(wrong: Result) -> None:
-    c = found(wrong)
-    assert c["K"].estimate == pytest.approx(1.0 / 1.01, rel=1e-3)
-    assert c["delay"].estimate == pytest.approx(c["delay"].truth - 0.2, abs=0.01)  # ms
-    rows = {r[0]: r for r in next(t for t in wrong.tables if t.id == "budget.predicted").rows}
-    assert rows["K"][3] == pytest.approx(-0.01, rel=0.02)
-    assert rows["delay"][3] == pytest.approx(-0.2, rel=0.02)
-    assert rows["f_90"][3] == pytest.approx(c["f_90"].estimate - c["f_90"].truth, rel=0.15)
-
-
-@pytest.mark.long
-def test_stated_uncertainties_are_in_u(wrong: Result) -> None:
-    c = found(wrong)
-    assert c["K"].u == pytest.approx(0.01, rel=0.05) and c["delay"].u == pytest.approx(0.2, rel=0.05)
-    assert {b.id for b in wrong.budget} == {"table.reading.gain", "table.reading.lag"}
-    assert abs(c["K"].z) < 1.1 and abs(c["delay"].z) < 1.1
-
-
 def test_the_table_loses_no_angle() -> None:
     part = Native("rate_table_vibrating", read_gain=0.01, read_lag=1e-3)
     part.initialize()

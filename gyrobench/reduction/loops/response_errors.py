@@ -37,12 +37,15 @@ WRONG = {
     READING_LAG.id: ("a reading late by 1 ms (a sample too much)", 1e-3),
     GAIN_SLOPE.id: ("an amplitude wrong by 2 % at the highest frequency", 0.02),
 }
-#: what the intervals of figures leave out where nothing is stated of it
+#: of the instrument alone are the figures that these move only where something is stated of it
 LEFT_OUT = {
-    READING_GAIN.id: "The intervals of {} include no gain error of the table reading, which no residual shows: "
-    "state u_gain.",
-    READING_LAG.id: "The intervals of {} include no lag of the table reading, which no residual shows: state u_lag.",
+    READING_GAIN.id: "Nothing is stated of the gain of the table reading (u_gain), and no residual shows it: of {} the "
+    "value and its interval are those of instrument and reading together.",
+    READING_LAG.id: "Nothing is stated of a lag of the table reading (u_lag), and no residual shows it: of {} the "
+    "value and its interval are those of instrument and reading together.",
 }
+TOGETHER = ", of instrument and table reading together"
+Figures = Sequence[tuple[int, str, str, float, float]]
 UNKNOWN = 1e-3  # u of points that state none: any, the scatter about the curve takes its place
 BEND = 3  # degree in ln f of the logarithm of the noise, which is smooth
 ROOT_POWER = math.exp(0.5 * (math.log(LINES / 2.0) - float(special.psi(LINES / 2.0))))  # 1 over exp(mean ln s)
@@ -127,9 +130,7 @@ class Sensitivity:
         return BudgetLine(s.id, s.name, self.u, s.unit, slope, per, abs(self.share(k)) / scale, unit, name, s.note)
 
 
-def predicted_shifts(
-    run: RunDocument, by: Sequence[Sensitivity], figures: Sequence[tuple[int, str, str, float, float]]
-) -> Table | None:
+def predicted_shifts(run: RunDocument, by: Sequence[Sensitivity], figures: Figures) -> Table | None:
     """Return by how much each figure is off by the simulated errors of the set-up; None without one.
 
     figures: place among the sensitivities, name, printed unit, SI per unit, standard uncertainty in SI.
@@ -143,9 +144,32 @@ def predicted_shifts(
     return shifts_table([(s.source.name, e, s.source.unit) for s, e in known], shifts)
 
 
-def not_stated(
-    run: RunDocument, by: Sequence[Sensitivity], figures: Sequence[tuple[int, str, str, float, float]]
-) -> Iterator[Reason]:
+def unstated(run: RunDocument, by: Sequence[Sensitivity], figures: Figures) -> dict[str, dict[str, float]]:
+    """Return what is not stated though no residual shows it: source -> figure -> its change over u by an error as in
+    WRONG.  Of a run, those of which it has an error.  figures: as of :func:`predicted_shifts`.
+    """
+    errors = {} if run.measured else simulated_errors(run)
+    return {
+        s.source.id: {
+            name: WRONG[s.source.id][1] * abs(float(np.nan_to_num(s.change[k]))) / u
+            for k, name, _, _, u in figures
+            if u > 0.0
+        }
+        for s in by
+        if s.source.id in WRONG and s.u == 0.0 and (run.measured or errors.get(s.source.id))
+    }
+
+
+def together(run: RunDocument, by: Sequence[Sensitivity], figures: Figures) -> dict[str, tuple[str, ...]]:
+    """Return the figures that are of instrument and table reading together, by the source of which nothing is stated.
+
+    A record that declares type_b = none states that the reading has no error.
+    """
+    unknown = {} if run.measured and run.type_b == "none" else unstated(run, by, figures)
+    return {id: tuple(n for n, v in unknown[id].items() if v > 1.0) for id in LEFT_OUT if id in unknown}
+
+
+def not_stated(run: RunDocument, by: Sequence[Sensitivity], figures: Figures) -> Iterator[Reason]:
     """Yield what a measured record does not state though no residual shows it: gain and lag of the reading, of each
     figure that they move, and that units and scales were checked (see gyrobench.reduction.diagnosis.unshown).
 
@@ -153,23 +177,14 @@ def not_stated(
     """
     if not run.measured:
         return
-    unknown = {
-        s.source.id: {
-            name: WRONG[s.source.id][1] * abs(float(np.nan_to_num(s.change[k]))) / u
-            for k, name, _, _, u in figures
-            if u > 0.0
-        }
-        for s in by
-        if s.source.id in WRONG and s.u == 0.0
-    }
-    for id, text in LEFT_OUT.items():
-        names = tuple(n for n, v in unknown.get(id, {}).items() if v > 1.0)
-        if names and run.type_b != "none":
-            yield Reason(TYPE_B_UNSTATED, text.format(", ".join(names)), ("pass", "fail"), names, severity="doubt")
+    for id, names in together(run, by, figures).items():
+        if names:
+            text = LEFT_OUT[id].format(", ".join(names))
+            yield Reason(TYPE_B_UNSTATED, text, ("pass", "fail"), names, severity="doubt")
     if run.arrangement == "checked":
         return
     said = ["frequencies in rad/s given as Hz (6.28 times)"] if figures else [WRONG[TIME_BASE.id][0]]
-    for id, moved in unknown.items():
+    for id, moved in unstated(run, by, figures).items():
         far = sorted((n for n, v in moved.items() if v > 1.0), key=lambda n: -moved[n])[:3]
         if far:
             said.append(f"{WRONG[id][0]} ({', '.join(f'{n} by {plain(moved[n])} u' for n in far)})")
@@ -181,5 +196,5 @@ def not_stated(
 
 
 def left_out(reasons: Sequence[Reason]) -> list[str]:
-    """Return what the intervals leave out, as sentences of the summary: it is to stand beside the figures."""
+    """Return of what the figures are where nothing is stated, as sentences of the summary."""
     return [r.text for r in reasons if r.id == TYPE_B_UNSTATED]
