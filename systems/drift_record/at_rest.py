@@ -29,6 +29,7 @@ from .channels import RecordChannel, mean_of, triads
 from .noise_tables import number
 
 NEAR = 0.1  # of g, bias and scale factor of a triad that is at rest and in its unit
+NOTHING = 0.01  # of g: the means were taken out
 SEEN = 0.1  # of the Earth's rate: |ω| so near to it is the Earth's
 #: true value over the one that was read -> what was mistaken
 FORCE_UNITS: Mapping[float, str] = {
@@ -95,11 +96,16 @@ def _gravity(
                 ["elevation of the axes", None, None, None, "°", f"{slope}; 1 mg of bias is 3.4′"]]  # fmt: skip
         return rows, [], up
     finding = _mistaken(ratio, FORCE_UNITS)
-    text = f"|f| of {_names(triad)} is {number(size)} m/s², {number(ratio)} times gravity: " + (
-        f"{finding}? Correct it in the file or the column map: the coefficients of these channels are off by as much."
-        if finding else "not gravity. Check unit, scale and names of the axes; if they are right it was not at rest."
-    )  # fmt: skip
-    row = [f"|f| of {_names(triad)}", size, u_size, g, "m/s²", finding or "not gravity"]
+    other = "the mean was taken out" if ratio < NOTHING else "not gravity"
+    text = f"|f| of {_names(triad)} is {number(size)} m/s², {number(ratio)} times gravity: "
+    if finding:
+        text += f"{finding}? Correct it in the file or the column map: "
+        text += "the coefficients of these channels are off by as much."
+    elif ratio < NOTHING:
+        text += f"{other}, so that nothing checks their unit and the attitude."
+    else:
+        text += f"{other}. Check unit, scale and names of the axes; if they are right it was not at rest."
+    row = [f"|f| of {_names(triad)}", size, u_size, g, "m/s²", finding or other]
     return [row], [_reason("gravity", text, triad)], None
 
 

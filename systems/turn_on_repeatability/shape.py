@@ -17,7 +17,8 @@ OTHER = (
 )
 HIDDEN = (
     "Intervals of the warm-up allow for a second exponential that the record does not exclude; of two, those of the "
-    "bias when warm and of the time until it is warm for a third."
+    "bias when warm and of the time until it is warm for a third. Slow ones of opposite sign that cancel within the "
+    "readings are in none."
 )
 BANDS = 12  # of the time since the turn-on, even in its logarithm
 

@@ -86,6 +86,12 @@ def test_a_mistaken_unit_is_named(tmp_path: Path) -> None:
     assert not any("latitude" in s and "that is" in s for s in result.summary)
 
 
+def test_a_mean_that_was_taken_out_is_said(tmp_path: Path) -> None:
+    columns = {n: v - v.mean() if n.startswith("acc") else v for n, v in unit_at_rest(1024).items()}
+    (said,) = [r for r in reduce(tmp_path, columns).reasons if r.id == "drift_record.gravity"]
+    assert "the mean was taken out" in said.text and "not at rest" not in said.text
+
+
 @pytest.mark.usefixtures("no_arma")
 @pytest.mark.long
 def test_a_single_accelerometer_above_gravity_is_named_from_a_forked_process_too(
