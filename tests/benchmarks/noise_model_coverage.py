@@ -208,7 +208,8 @@ def main(seeds: range, lengths: tuple[float, float], kinds: list[str], only: str
                     inside["sigma together"].append(g.sigma.low <= math.hypot(*those) <= g.sigma.high)
         seconds = (time.process_time() - began) / len(seeds)
         among = f"{lengths[0]:.0f} to {lengths[1]:.0f} samples {' '.join(kinds)}"
-        print(f"{name}, {among}: agree {sum(agreed)} of {len(agreed)}, {seconds:.2f} s")
+        others = ", ".join(str(i) for i, agrees in zip(seeds, agreed, strict=True) if not agrees) or "none"
+        print(f"{name}, {among}: agree {sum(agreed)} of {len(agreed)}, all but {others}; {seconds:.2f} s")
         print("   inside:", ", ".join(f"{k} {np.mean(v):.3f} ({sum(v)} of {len(v)})" for k, v in inside.items()))
         print("   missed:", ", ".join(missed) or "none")
         stating = max(sum(agreed), 1)

@@ -394,6 +394,15 @@ def test_long_stretches_have_a_length_of_small_factors() -> None:
     assert treatment.stretches_of(rate[:99_991]) == [slice(0, 99_991)]
 
 
+@pytest.mark.long
+def test_samples_that_stay_out_are_not_taken_out() -> None:
+    """100,352 = 2^11 7^2 of 100,799 samples: the walk's level at the end, some ten times the noise, is no pulse."""
+    rng = np.random.default_rng(4)
+    model = fit_noise(rng.normal(size=100_799) + np.cumsum(0.03 * rng.normal(size=100_799)), 1.0, means=False)
+    whole, clean = model.agreements
+    assert model.agrees and whole.implied == pytest.approx(clean.implied[: whole.implied.size], rel=1e-9)
+
+
 def test_degrees_of_freedom_of_long_averaging_times_count_every_start() -> None:
     """Above 1024 samples a deviation is summed from every second, fourth ... start, of as many degrees of freedom: by
     the spectrum of white noise those of its power law.  They came out 2, 4 and 8 times too small.

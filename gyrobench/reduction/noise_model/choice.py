@@ -42,7 +42,7 @@ class Scaled:
 def deviations_of(raw: Array, treated: Treated, ramp: float) -> Scaled:
     """Return the deviations of a record (n,) with its ramp per sample."""
     clean = treated.cleaned()
-    removed = raw - np.where(np.isfinite(clean), clean, 0.0)
+    removed = raw - clean  # of samples in no stretch it is not known
     for s in treated.stretches:  # of a wild sample what it exceeds its neighbours' word by
         at = s.start + s.done.wild
         removed[at] = raw[at] - s.done.x[s.done.wild]
