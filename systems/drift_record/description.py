@@ -235,7 +235,7 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
         look = "Take the record as it was sampled." if noise.slower else look
         say("misfit", f"{noise_tables.agreement_text(noise)} No coefficient is stated. {look}")
     found = {"wild": noise_tables.wild_text(noise, p.time, p.units),
-             "step": noise_tables.steps_text(noise, p.time, p.units),
+             "step": noise_tables.steps_text(noise, p.time, p.units), "jumps": noise_tables.jumps_text(noise),
              "pulse": noise_tables.pulses_text(noise, p.time, p.units),
              "settling": noise_tables.settling_text(noise, p.units),
              "swings": noise_tables.swings_text(noise, p.units), "curve": noise_tables.curve_text(noise),

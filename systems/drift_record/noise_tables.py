@@ -250,6 +250,17 @@ def steps_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
     )
 
 
+def jumps_text(noise: NoiseModel) -> str:
+    """Return that the level jumps too often for its jumps to be taken out; "" where it does not."""
+    if not noise.treatment.jumps or noise.slower:
+        return ""
+    return (
+        f"The level jumps {MOST} times or more, for good or for a while: the jumps are part of the noise (popcorn "
+        "noise, or an instrument that is touched again and again). None is taken out, and slow terms are theirs; the "
+        "intervals, made for normal noise, may be too narrow."
+    )
+
+
 def pulses_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
     """Return the pulses that were taken out, by their angles (velocities of accelerometers)."""
     if not noise.pulses or noise.slower:
@@ -258,10 +269,9 @@ def pulses_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
     each = sorted((time[min(at, time.size - 1)], length, size / si, u / si) for at, length, size, u in noise.pulses)
     said = ", ".join(f"{number(size, u)} {unit} at {number(t)} s" for t, _, size, u in each)
     longest = number(max(length for _, length, _, _ in each))
-    more = " There may be more of them, which N holds." if len(each) >= MOST else ""
     return (
         f"Pulses of {said}, within {longest} s, which no noise of the rest makes, are taken out before the model; left "
-        f"in, N takes them for its random walk. Look for what touched the instrument.{more}"
+        f"in, N takes them for its random walk. Look for what touched the instrument."
     )
 
 

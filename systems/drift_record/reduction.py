@@ -106,6 +106,8 @@ def _reasons(a: Analysed, run: RunDocument, several: bool) -> list[Reason]:
     """Return what is to be said of a column, and what takes the verdicts of its coefficients away."""
     names = tuple(_named(term, a, several) for term in (*TERMS, LEAST_DEVIATION))
     against = [(id, text, names) for id, text in description.doubts(a.of, run).items()]
+    if jumps := noise_tables.jumps_text(a.noise):
+        against.append(("drift_record.jumps", jumps, names))
     if curve := noise_tables.curve_text(a.noise):
         against.append(("drift_record.curve", curve, tuple(_named(term, a, several) for term in ("K", "R"))))
     if taken_off := description.taken_off_text(a.of):

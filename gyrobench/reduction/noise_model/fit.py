@@ -57,13 +57,14 @@ WORTH = 0.01  # of the most probable model with a term: weight of one whose uppe
 SLOWEST = math.log(10.0)  # logarithm of the record over tau of a process that drifts as a walk within it
 BARELY = math.log(2.0)  # above the variance that a record just shows: what is below is as good as absent
 FAST = ("N", "Q")  # coefficients that a band too weak to be found counts as
-CHANGES = {LevelStep: 5, Pulse: MOST, Settling: 1, Swing: 2}  # at most
+CHANGES = {LevelStep: MOST, Pulse: MOST, Settling: 1, Swing: 2}  # at most; so many steps or pulses are noise
 RATIO = 8.0  # of the likelihood ratio of a step or a pulse, above 2 log n (widths)
 SLOW, SEEN = 24.0, 9.0  # of that of a slow change: some ten of them differ; and before the models are fitted again
 LEAK = 10.0  # ordinates of mean power
 DENSE = 4000  # frequencies of a spectrum that is interpolated
 AVERAGES = 40  # averaging times between which the minimum is sought
 SAMPLE = 250  # draws of the ramp and the minimum
+NOWHERE = 1.05  # of N squared: white noise that is nowhere less is nowhere seen as low
 
 
 @dataclass(frozen=True)
@@ -143,13 +144,18 @@ def _fit(treated: Treated, raw: Array, means: bool) -> _Fit:
 
 # ------------------------------------------------------------------ changes of the level
 def _without_changes(treated: Treated, means: bool) -> tuple[Treated, ModelSearch]:
-    """Return the record without the changes of its level that the likelihood asks for, and the models of the rest."""
-    found = search(treated.ordinates(means))
+    """Return the record without the changes of its level that the likelihood asks for, and the models of the rest.
+
+    A level that jumps more often than steps or pulses can be taken out does so as part of its noise: none is then.
+    """
+    whole, found = treated, search(treated.ordinates(means))
     while changes := _changes_of(treated, found, means):
         better = treated.without(changes)
         data = better.ordinates(means)
         # what was completed beside the changes, bands too, may not be there without them
         completed = any(s.done.extra is not None for s in treated.stretches)
+        if max(len(better.steps), len(better.pulses)) >= MOST:
+            return _without_changes(replace(whole, jumps=True), means)
         treated, found = better, search(data) if completed else search_again(data, found)
     return treated, found
 
@@ -204,6 +210,8 @@ def _changes_of(treated: Treated, found: ModelSearch, means: bool) -> list[Place
             places: dict[type[LevelChange], Sequence[int]] = {LevelStep: every}
             if model is at.model:
                 places |= {Pulse: every, Settling: [0], Swing: [longest]}
+            if treated.jumps:
+                places = {kind: where for kind, where in places.items() if kind not in (LevelStep, Pulse)}
             each = [(largest(kind, of[i]), i) for kind in places if taken[kind] < CHANGES[kind] for i in places[kind]]
             groups = ([e for e in each if isinstance(e[0][0], kinds)] for kinds in (LevelStep, Pulse, Settling | Swing))
             for (change, ratio), i in [max(e, key=lambda e: e[0][1]) for e in groups if e]:
@@ -256,6 +264,7 @@ def _coefficient(name: str, at: Fitted, found: ModelSearch, clouds: Sequence[Clo
     low, high = (math.exp(0.5 * quantile(values, weights, q)) for q in (0.025, 0.975))
     if name == "N":
         low, high = _beside_any_drift(figure, clouds, low, high)
+        high = max(high, _as_seen(found, at))
     least = found.prior.others[CALLED[name]][0] + BARELY
     absent = 1.0 - float(weights.sum()) + float(weights[values < least].sum())
     own = figure(at.model, at.p[None])
@@ -282,6 +291,22 @@ def about(value: float, low: float, high: float) -> tuple[float, float]:
     if value < low:
         return value * value / high, high
     return low, high
+
+
+def _as_seen(found: ModelSearch, at: Fitted) -> float:
+    """Return the largest level of the white noise where it is half of the spectrum or more, as N; 0 where it is
+    somewhere seen as low as N.
+
+    A filter that rises, under a process that hides all below, has an N that is nowhere seen: it may be the process that
+    falls otherwise, as that of bumps does.
+    """
+    grid = found.data.grid
+    white = next((np.asarray(t.spectrum(q, grid)) for t, q in split(at.model, at.p) if t.name == "white"), np.zeros(0))
+    seen = white[white > 0.5 * spectrum(at.model, at.p, grid)] if white.size else white
+    own = size_of("white")(at.model, at.p[None])
+    if own is None or not seen.size or float(np.min(seen)) < NOWHERE * math.exp(float(own[0])):
+        return 0.0
+    return math.sqrt(float(np.max(seen)))
 
 
 def _beside_any_drift(

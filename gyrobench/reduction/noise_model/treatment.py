@@ -64,6 +64,7 @@ class Treated:
     spread: variance of the mean square of the noise over that of even normal noise, 1 where the level is even; levels
     (k,): rms of the noise in parts of the record, over that of all; p_level: probability of so large a difference of
     them; rounding: variance of what the step of the output makes, 0 where it has none.
+    jumps: whether the level steps too often for steps to be taken out.
     """
 
     samples: int
@@ -75,6 +76,7 @@ class Treated:
     p_level: float
     find_wild: bool
     rounding: float = 0.0
+    jumps: bool = False
 
     def without(self, changes: Sequence[Placed]) -> Treated:
         """Return the record with changes of the level taken out and their stretches completed anew.
