@@ -51,12 +51,13 @@ def values_of(model: NoiseModel, of: ChannelUnits, published: str) -> dict[str, 
     N, t = model["N"], model.treatment
     low, high = (write_number(v / si, (N.high - N.low) / (4.0 * si)).text for v in (N.low, N.high))
     white = f"{write_number(N.value / si, (N.high - N.low) / (4.0 * si)).text} ({low} to {high}) {unit}"
-    counts = ((t.wild.size, "wild"), (len(t.steps), "steps"), (len(t.pulses), "pulses"), (len(t.lines), "lines"))
+    counts = ((t.wild.size, "wild"), (len(t.steps), "step"), (len(t.pulses), "pulse"), (len(t.lines), "line"))
     changes = [f"{c.coefficient or c.term.name.replace('_', '-')} {c.rms.min():.3f} to {c.rms.max():.3f}"
                for c in changing(model.over_time) if c.term.name not in PEAKS]  # fmt: skip
     bands = sum(c.term.name in PEAKS for c in changing(model.over_time))
     changes += [f"{bands} band{'s' if bands > 1 else ''}"] if bands else []
-    remarks = [f"{n} {word}" for n, word in counts if n]
+    remarks = [f"{n} {word}{'s' * (n > 1 and word != 'wild')}" for n, word in counts if n]
+    remarks += ["jumps"] * t.jumps
     remarks += [*["settles"] * bool(t.settling), *["swings"] * bool(t.swings)]
     tau = " to ".join(write_number(x, significant=2).text for x in (whole.tau[0], whole.tau[-1]))
     return {
