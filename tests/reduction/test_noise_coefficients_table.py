@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from gyrobench.reduction.noise_model.fit import fit_noise
+from gyrobench.reduction.noise_model.noise_model import NoiseModel
 from gyrobench.reduction.series.noise_coefficients_table import ENDS, LEAST, RESIDUAL, noise_coefficients_table, on_grid
 from gyrobench.report.language import Language, catalogue
 
@@ -95,6 +98,16 @@ def test_what_is_taken_out_and_what_no_model_describes_is_told() -> None:
     (table,) = noise_coefficients_table(result, record)
     assert table.caption.startswith("The noise model does not describe the record, so that no coefficient is stated.")
     assert [row[1:4] + row[5:] for row in table.rows] == [[None, None, None, "not determined"]] * 5
+
+
+def test_a_level_that_jumps_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def jumping(rate: np.ndarray, tau0: float) -> NoiseModel:
+        found = fit_noise(rate, tau0)
+        return replace(found, treatment=replace(found.treatment, jumps=True))
+
+    monkeypatch.setattr("gyrobench.reduction.series.noise_coefficients_table.fit_noise", jumping)
+    (table,) = noise_coefficients_table(*long_test())
+    assert table.caption.endswith("; the level jumps as part of the noise")
 
 
 def test_a_missing_window_is_a_gap() -> None:

@@ -63,6 +63,8 @@ def noise_coefficients_table(result: DriftTestResult, record: Record, residual: 
         caption = f"The noise model does not describe the record, so that no coefficient is stated. {caption}"
     elif taken := _taken(noise.treatment):
         caption = f"{caption}; taken out before: {taken}"
+    if noise.treatment.jumps:
+        caption = f"{caption}; the level jumps as part of the noise"
     caption = f"{caption}. {RESIDUAL}" if residual else caption
     columns = ["coefficient", "value", "95 % from", "95 % to", "unit", "finding"]
     return [Table("noise_coefficients", "Noise coefficients", caption, columns, rows)]
