@@ -16,6 +16,7 @@ from gyrobench.reduction.series.deviations import Deviation
 ENOUGH = 0.95  # of the averaging times
 PART = 0.1  # of the record: longest averaging time
 SHORTEST = 2  # samples: least averaging time
+COVERED = 3  # averaging times over which differences begin, at least; missing samples leave fewer
 NARROW = 0.5  # rad, phase over an averaging time below which a cell is narrow against its frequency
 LOW_CELLS, CELLS = 4000, 1 << 15  # of the spectrum that decides the degrees of freedom: equal logarithms, equal width
 ORDERS = np.arange(1.0, 5.0)[:, None]  # of the waves whose sum sin^8 is
@@ -84,8 +85,12 @@ class DeviationAgreement:
 
 
 def compare(own: Deviation, implied: Array, samples: int) -> DeviationAgreement:
-    """Return the agreement of a deviation with the implied one (k,) at its tau, in samples."""
-    k = (own.tau >= SHORTEST - 1e-9) & (own.tau <= PART * samples * (1.0 + 1e-9))
+    """Return the agreement of a deviation with the implied one (k,) at its tau, in samples.
+
+    Where few differences are left among missing samples, neighboring averaging times are of the same few, all of them
+    off together: they tell of one chance, not of several.
+    """
+    k = (own.tau >= SHORTEST - 1e-9) & (own.tau <= PART * samples * (1.0 + 1e-9)) & (own.count >= COVERED * own.tau)
     return DeviationAgreement(own.tau[k], own.deviation[k], own.low[k], own.high[k], implied[k])
 
 
