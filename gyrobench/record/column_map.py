@@ -39,9 +39,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from gyrobench import reading, units
 from gyrobench.bench import UsageError, suggest_names
@@ -49,6 +49,7 @@ from gyrobench.boundary import faults_of
 from gyrobench.record.clock_times import DATED, HALF_DAY, SET_BACK, length_between, long_readings, moment
 from gyrobench.record.column_numbers import write_numbers
 from gyrobench.record.csv_reader import HEAD_ROWS, DataError, row_list, thousands
+from gyrobench.record.first_cells import COUNTS
 from gyrobench.record.log_files import as_text, is_log
 from gyrobench.record.row_faults import NOTHING
 from gyrobench.record.text_cells import cells_of_file, without_mark
@@ -65,7 +66,7 @@ class MappedColumn(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
     source: str | int | list[str | int] = Field(default="", alias="from")
-    unit: str = ""
+    unit: Annotated[str, AfterValidator(lambda unit: COUNTS.sub("1", unit))] = ""
     factor: float = 1.0
     time: str = ""
     next: str = ""

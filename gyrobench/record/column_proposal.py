@@ -11,7 +11,6 @@ import codecs
 import json
 import math
 import re
-import statistics
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
@@ -21,6 +20,7 @@ from pathlib import Path
 
 from gyrobench import units
 from gyrobench.bench import UsageError
+from gyrobench.record import first_cells
 from gyrobench.record.clock_times import moment
 from gyrobench.record.csv_reader import DECIMAL_COMMA, regular
 from gyrobench.record.row_faults import NOTHING
@@ -29,7 +29,6 @@ from gyrobench.record.text_cells import BINARY, cells_of_file, without_mark
 SAMPLE = 1 << 22  # bytes that are looked at
 FEW_KINDS = 6  # of rows that are told by a word
 IN_TURN = 20  # rows of another width that are no head of a file
-FIRST = 200  # numbers of a column: it is put into other positions later
 LONG = 2000  # rows from which on a file is taken for time series
 DAYS = (
     "%d.%m.%Y", "%Y-%m-%d", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d-%b-%Y", "%d %b %Y", "%d-%b-%y",
@@ -64,16 +63,22 @@ MESSAGES = {
     r"(.*\.|field)?angular_velocity[._]?[xyz]\d*|gyro_rad": "rad/s",
     r"(.*\.|field)?linear_acceleration[._]?[xyz]\d*": "m/s2",
 }
-EPOCH = (1e9, 4.1e9)  # s since 1970: 2001 and 2100
+#: first cell of each row of an instrument that writes sentences -> its columns
+SENTENCES = {
+    "$VNYMR": ("", "yaw", "pitch", "roll", *(f"mag_{a}" for a in "xyz"), *(f"acc_{a} [m/s2]" for a in "xyz"),
+               *(f"gyro_{a} [rad/s]" for a in "xyz")),
+}  # fmt: skip
 NO_NAMES = "names = false  # no row of names: columns by their numbers"
 ENDING = re.compile(rf"(.*?[^_ .])[_ .]({'|'.join(sorted(ENDINGS, key=len, reverse=True))})")
 #: units whose sign means something else elsewhere (mg is milligauss, too) -> names that they count beside
 SAID = {"degC": r".*temp.*", **dict.fromkeys(("g", "mg"), r"(.*acc|.*beschl|[af]_?[xyz]).*")}
+COUNTER = r"n|nr|no|num|id|index|.*(sample|count|seq|row|packet|frame|number).*"
+CLOCK = "((sys(tem)?|gps|log|device|sensor|unix|utc|epoch)_?)"
 #: name of the bench, or its beginning -> what laboratories call it
 CALLED = {
     "t_start": r"t_?start|start|beginn|begin|von|from|zeit.*|time.*|datum.*|date.*|uhrzeit|t",
     "t_end": r"t_?end|ende?|bis|stop|to|until",
-    "time": r"time.*|.*stamp|zeit.*|datum.*|date.*|uhrzeit|x_value|ts?|seconds.*|elapsed.*",
+    "time": rf"{CLOCK}?time.*|.*stamp|zeit.*|datum.*|date.*|uhrzeit|x_value|ts?|seconds.*|elapsed.*",
     "phase": r"phase.*|lage.*|abschnitt.*|stellung.*",
     "day": r"day|tag",
     "mean": r"mean.*|mittel.*|strom.*|current.*|i|spannung.*|voltage.*",
@@ -104,6 +109,13 @@ class FileColumn:
     shown: str = ""  # first values of a column without a name
     exchangeable: bool = False  # day and month of its dates fit the other way round, too
     level: float = math.nan  # median of its first numbers
+    whole: bool = False  # its first numbers have no fractions
+    of_times: str = "s"  # unit that it may be in, if it is a time
+
+    @property
+    def counts(self) -> bool:
+        """Whether it numbers the rows, by its name."""
+        return bool(re.fullmatch(COUNTER, _plain(self.name)))
 
     @property
     def exponents(self) -> object:
@@ -202,7 +214,9 @@ def find_layout(file: Path) -> FileLayout:
         )
     comma = delimiter != "," and any(DECIMAL_COMMA.fullmatch(c) for r in rows for c in r)
     numbered = len(names) != width
-    columns = _columns(names[:width] or [""] * width, lines[of_units] if of_units >= 0 else [], rows, numbered)
+    written = SENTENCES.get(rows[-1][0], ())
+    names = names[:width] or (list(written) if len(written) == width else [""] * width)
+    columns = _columns(names, lines[of_units] if of_units >= 0 else [], rows, numbered)
     skip, below = (start, 0) if numbered else (at, start - at - 1)
     decimal = "," if comma else "."
     return FileLayout(encoding, delimiter, decimal, skip, below, len(rows), columns, not numbered)
@@ -294,15 +308,15 @@ def _columns(
         dated = cells and not NUMBER.fullmatch(cells[0])  # no form of a date or clock time is a number
         time = next((f for f in FORMATS if dated and all(_fits(c, f) for c in cells[:200])), "")
         if not (written or time) and re.fullmatch(CALLED["time"], _plain(name)):
-            written = _epoch(cells)
+            written = first_cells.epoch(cells)
         unit = "" if time else _read_unit(written) or ""
         source: str | int = text if names.count(text) == 1 and text and not numbered else k + 1
         shown = "" if name and not re.fullmatch(r"column_\d+", name) else ", ".join(cells[:3])
         empty, name = len(rows) - len(cells), name or f"column_{k + 1}"
         other = time.replace("%d/%m", "%m/%d")  # the one that is tried later
         either = time != other and all(_fits(c, other) for c in cells[:200])
-        of = (_rises(cells), shown, either, _level(cells))
-        found.append(FileColumn((source,), name, unit, written, time, empty, *of))
+        of = (first_cells.rises(cells), shown, either, first_cells.level(cells), first_cells.whole(cells))
+        found.append(FileColumn((source,), name, unit, written, time, empty, *of, first_cells.unit_of_times(cells)))
     joined: list[FileColumn] = []
     for c in found:
         last = joined[-1] if joined else None
@@ -312,34 +326,6 @@ def _columns(
         else:
             joined.append(c)
     return tuple(joined)
-
-
-def _epoch(cells: Sequence[str]) -> str:
-    """Return the unit of times since 1970, "" of other numbers."""
-    with suppress(ValueError, IndexError):
-        ends = float(cells[0]), float(cells[-1])
-        for unit in ("s", "ms", "us", "ns"):
-            first, last = (units.convert(end, unit, "s") for end in ends)
-            if EPOCH[0] <= first <= last < EPOCH[1]:
-                return unit
-    return ""
-
-
-def _numbers(cells: Sequence[str]) -> list[float]:
-    return [float(c.replace(",", ".")) for c in cells]
-
-
-def _level(cells: Sequence[str]) -> float:
-    with suppress(ValueError):
-        return statistics.median(_numbers(cells[:FIRST]))
-    return math.nan
-
-
-def _rises(cells: Sequence[str]) -> bool:
-    with suppress(ValueError):
-        numbers = _numbers(cells)
-        return len(numbers) > 9 and all(a < b for a, b in pairwise(numbers))
-    return False
 
 
 def _fits(text: str, form: str) -> bool:

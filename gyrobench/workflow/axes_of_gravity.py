@@ -27,7 +27,8 @@ def triads(columns: Sequence[FileColumn]) -> tuple[list[FileColumn], list[FileCo
     quaternions = {c.sources for q in fours if abs(sum(c.level**2 for c in q) - 1.0) < EXACT for c in q}
     threes = [list(columns[k : k + 3]) for k in range(len(columns) - 2)]
     alike = [t for t in threes if len({_stem(c) for c in t}) == 1 and not quaternions & {c.sources for c in t}]
-    forces = next((t for t in alike if unit_of(t) in ("m/s2", "g")), [])  # a thousand may be anything
+    # one may be angles or a field by chance, and a thousand anything
+    forces = next((t for unit in ("m/s2", "g") for t in alike if unit_of(t) == unit), [])
     rates = [c for c in columns if c not in forces]
     return forces, rates if forces and len(rates) == 3 else []
 

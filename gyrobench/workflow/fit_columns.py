@@ -34,14 +34,20 @@ from gyrobench.workflow.empty_record import empty_record
 from gyrobench.workflow.inputs import load_test
 
 OPTIONAL = ("std", "n", "flagged")
-COUNTS = "counts"  # of columns that are called as the angle or velocity of each sample
+COUNTED = "counts"  # unit of readings that are whole numbers
+COUNTS = "counts"  # option, of columns that are called as the angle or velocity of each sample
 FOUND = (COUNTS, "attitudes")  # what the columns tell
 KINDS = ("rad/s", "rad", "m/s2", "K")  # of the columns of a drift record, which has any names
+BESIDE = ("s", "ms", "us", "ns", "K", "degC")  # units of what stands beside rates and forces
 #: what columns without a unit are called -> unit that may be meant
-OTHER = r"(?!.*(time|stamp|_dt\b|count|clip|covariance|_id\b|status))"  # what belongs to a rate or force and is none
+# what belongs to a rate or force and is none
+OTHER = r"(?!.*(time|stamp|_dt\b|count|clip|covariance|_id\b|status|valid|accuracy|norm|temp|quat))"
+TURN = r"(theta|th|ang\w*|rot\w*|phi)"
 LIKELY = {
-    OTHER + r"((\w+_)?gyr.*|omega.*|[gw]_?[xyz]|(dreh)?rat.*)": "deg/s",
-    OTHER + r"((\w+_)?acc.*|beschl.*|[af]_?[xyz])": "m/s2",
+    OTHER + rf"(.*delta|.*incr\w*|d)_?{TURN}(_?[xyz])?": "rad",
+    OTHER + r"(.*delta|.*incr\w*|d)_?v(el\w*)?(_?[xyz])?": "m/s",
+    OTHER + r"((\w+_)?gyr.*|omega.*|[gw]_?[xyz]|(dreh)?rat.*|.*(angular|rotation)_?(rate|vel).*)": "deg/s",
+    OTHER + r"((\w+_)?acc.*|.*accel.*|beschl.*|[af]_?[xyz])": "m/s2",
     r".*temp.*": "degC",
 }
 
@@ -96,6 +102,9 @@ class ColumnProposal:
             entry = f"[columns.{name}] with from = {source}{unit}"
             none = f"column '{name}': none of the file fits by name and unit"
             problems.append(f"{none}; write {entry}; not used so far: {unused}")
+        if "attitudes" in self.stated:
+            alone = "" if any(n[0] == "g" for n in self.wanted) else ", or the gravity there"
+            problems.append(f'latitude of the place{alone}: write latitude = "45.75deg" below [set]')
         return text, problems
 
 
@@ -128,10 +137,10 @@ def _proposal(file: Path, test: System | Suite, table: str, text: Path) -> Colum
             wanted = series_columns(wanted)
         found = match_columns(wanted, layout)
         samples = _of_header(test.measured_data.samples) if isinstance(test, System) and test.measured_data else []
-        if samples and len(of_samples := _of_samples(samples, layout)) > len(found):
-            forces = axes_of_gravity.unit_of([of_samples[n] for n, _ in samples[-3:] if n in of_samples])
-            found, wanted = of_samples, [(n, forces if forces and n[0] == "a" else u) for n, u in samples]
-            if not any(n in found for n, _ in samples[1:4]):
+        of_samples = _of_samples(samples, layout) if samples else {}
+        if samples and (len(of_samples) > len(found) or not (found or layout.names)):
+            found, wanted = of_samples, [(n, _unit_of_sample(n, u, of_samples)) for n, u in samples]
+            if not any(n in found for n, _ in samples[1:4]) and any(n in found for n, _ in samples[-3:]):
                 wanted = [(n, u) for n, u in wanted if n[0] != "g"]
             stated = {"attitudes": "unknown", **stated}
     if "sampling" in test.options and wanted[0] == ("time", "s") and "time" not in found:
@@ -170,7 +179,7 @@ def _timed(column: FileColumn) -> bool:
 def _of_samples(samples: Sequence[tuple[str, str]], layout: FileLayout) -> dict[str, FileColumn]:
     """Return the columns of a logger's file; samples: time, three rates, three forces, with their units."""
     found = match_columns(samples, layout)
-    if "time" not in found and (rising := [c for c in layout.columns if c.rises and not c.unit]):
+    if "time" not in found and (rising := [c for c in layout.columns if c.rises and not c.unit and not c.counts]):
         found["time"] = rising[0]
     left = [c for c in layout.columns if c not in found.values() and not c.unit]
     names = [n for n, _ in samples]
@@ -183,12 +192,23 @@ def _of_samples(samples: Sequence[tuple[str, str]], layout: FileLayout) -> dict[
     return found
 
 
+def _unit_of_sample(name: str, unit: str, found: Mapping[str, FileColumn]) -> str:
+    """Return the unit that a column of a logger's file may be in, if it has none; found: name -> column."""
+    if name == "time":
+        return found[name].of_times if name in found else unit
+    triad = [found[name[0] + a] for a in "xyz" if name[0] + a in found]
+    gravity = axes_of_gravity.unit_of([found["a" + a] for a in "xyz" if "a" + a in found])
+    if triad and all(c.whole for c in triad) and gravity not in ("g", "m/s2"):
+        return COUNTED
+    return gravity if gravity and name[0] == "a" else unit
+
+
 def _any_names(layout: FileLayout, called: str) -> tuple[dict[str, FileColumn], list[tuple[str, str]]]:
     """Return the columns of a drift record, and their names with units that fit: time, then rates, angles and
     temperatures under their own names, those without a unit by what they, or the file, are called and by gravity."""
     found: dict[str, FileColumn] = {}
     wanted = []
-    times = [c for c in layout.columns if _timed(c)]
+    times = sorted((c for c in layout.columns if _timed(c)), key=lambda c: not (c.rises or c.time))
     words = len([*takewhile(lambda c: c.shown and not NUMBER.match(c.shown), layout.columns)])  # "gyro" in every row
     if not times and words + 1 < len(layout.columns):
         first = layout.columns[words]
@@ -196,32 +216,31 @@ def _any_names(layout: FileLayout, called: str) -> tuple[dict[str, FileColumn], 
     for c in layout.columns:
         name = re.sub(r"\W+", "_", c.name).strip("_") or f"column_{len(found) + 1}"
         likely = next((u for pattern, u in LIKELY.items() if re.fullmatch(pattern, name, re.I)), "")
-        timed = c in times
         kinds = (*KINDS, "m/s") if OF_EACH.fullmatch(name) else KINDS
         kind = next((k for k in kinds if c.unit and _is(c, k)), likely if not c.unit else "")
-        if timed and "time" not in found:
-            name, kind = "time", "s"
-        if kind and name not in found and not (timed and name != "time"):
+        if c in times[:1]:
+            name, kind = "time", c.of_times
+        if kind and name not in found:
             found[name] = c
             wanted.append((name, kind))
     forces = [n for n, u in wanted if u == "m/s2" and not found[n].unit]
     for three in (forces[k : k + 3] for k in range(0, len(forces), 3)):
         unit = axes_of_gravity.unit_of([found[n] for n in three])
         wanted = [(n, unit if unit and n in three else u) for n, u in wanted]
-    if all(u in ("s", "K", "degC") for _, u in wanted):
+    if all(u in BESIDE for _, u in wanted):
         axes = {c.name: c for c in layout.columns if c.name.casefold() in ("x", "y", "z") and not c.unit}
         if len(axes) == 3:
             found |= axes
             of_rates = re.search("gyr|angular|rate", called, re.I)
             unit = "" if of_rates else axes_of_gravity.unit_of([*axes.values()])
             wanted += [(name, unit or "deg/s") for name in axes]
-    if all(u in ("s", "K", "degC") for _, u in wanted):
+    if all(u in BESIDE for _, u in wanted):
         left = [c for c in layout.columns if c not in found.values() and not c.unit]
         for name, triad in zip(("acc", "gyro"), axes_of_gravity.triads(left), strict=True):
             unit = axes_of_gravity.unit_of(triad) if name == "acc" else "deg/s"
             found |= {f"{name}_{a}": c for a, c in zip("xyz", triad, strict=False)}
             wanted += [(f"{name}_{a}", unit) for a, _ in zip("xyz", triad, strict=False)]
-    if all(u in ("s", "K", "degC") for _, u in wanted):
+    if all(u in BESIDE for _, u in wanted):
         wanted.append(("rate", "deg/s"))
         if len(rest := [c for c in layout.columns if c not in found.values()]) == 1:
             found["rate"] = rest[0]
@@ -279,6 +298,8 @@ def _entry(name: str, c: FileColumn, unit: str, problems: list[str]) -> list[str
             problems.append(f"column '{name}': day and month may be exchanged in {c.time}")
     elif c.unit:
         lines.append(f"unit = {_quoted(c.unit)}")
+    elif unit == COUNTED:
+        lines.append(f"unit = {_quoted(unit)}")
     elif unit not in ("", "1"):
         lines.append(f"# unit = {_quoted(unit)}")
         said = f"'{c.written}' is unknown" if c.written else "the file tells none"
@@ -289,7 +310,7 @@ def _entry(name: str, c: FileColumn, unit: str, problems: list[str]) -> list[str
 
 
 def _counts(unit: str) -> str:
-    return "" if unit in ("s", "degC", "K") else " (of counts: unit and factor = the size of one)"
+    return "" if unit in BESIDE else " (of counts: unit and factor = the size of one)"
 
 
 def _quoted(value: str | int) -> str:

@@ -9,7 +9,6 @@ alone.  Without a time and a sampling rate each row is the mean of a position.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -22,6 +21,7 @@ from gyrobench.record import sampling
 from gyrobench.record.circumstances import Keys, faults
 from gyrobench.record.csv_reader import CsvColumn, DataError, Head
 from gyrobench.record.drift_columns import named, open_table
+from gyrobench.record.first_cells import COUNTS
 from gyrobench.record.record import Record
 from gyrobench.system.lab_record import TEXTS, measured_run, set_options
 from gyrobench.system.system import System
@@ -31,7 +31,6 @@ from .channels import CHANNELS, ImuInstrument
 
 UP_DOWN = "up_down"  # option attitudes
 
-COUNTS = re.compile(r" *\[(?:counts?|lsb|digits)\]", re.I)
 NUMBER = CsvColumn("position", "1", "number of the position, 0: moved", required=False)
 SHOWN = {"rad/s": "deg/h", "m/s2": "mg"}  # unit of a channel -> in warnings
 FEW = 20  # samples of a position, or of a piece of it
@@ -51,12 +50,15 @@ def read_log(system: System, data: Path, values: Mapping[str, str]) -> Record:
             system.set(name, values[name])  # says which options there are
     problems = faults(table.head.statements, Keys((*system.options, *TEXTS)))
     problems += set_options(system, table.head.statements, values)
-    table.head.names[:] = [COUNTS.sub(" [1]", name) for name in table.head.names]
+    table.head.names[:] = [COUNTS.sub("1", name) if name.endswith("]") else name for name in table.head.names]
     up_down = system["attitudes"] == UP_DOWN
     mine, columns, unclear = _columns(table.head, up_down)
     gyros = any(c.gyro for c in mine)
     if "latitude" not in system.given and (gyros or "gravity" not in system.given):
-        problems.append("'latitude' is not given: write '# latitude = 45.75deg' in the file or --set latitude=45.75deg")
+        instead = "" if gyros else " (or gravity = 9.8067m/s2)"
+        problems.append(
+            f"'latitude' is not given: write '# latitude = 45.75deg' in the file or --set latitude=45.75deg{instead}"
+        )
     problems += unclear
     if problems:
         raise DataError(data, problems)
@@ -156,7 +158,12 @@ def _windows(
     if "position" in samples:
         found = [(a, b) for a, b in still.labelled(samples["position"]) if b - a >= FEW]
     else:
-        found = still.at_rest(time, every)
+        found, loud = still.at_rest(time, every, least)
+        if loud > still.LOUD[0]:
+            notes.append(
+                f"Positions at rest are the stretches that scatter up to {loud:g} times as much as the quietest tenth "
+                "of the record, as if a hand held the case: of up to twice as much there are too few."
+            )
         scatter = np.array([every[a:b].std(axis=0) for a, b in found]).reshape(-1, len(mine))
         crept = np.any(scatter > MOVED * np.maximum(np.median(scatter, axis=0), 1e-300), axis=1) & (len(found) > 0)
         if crept.any():

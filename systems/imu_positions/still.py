@@ -12,7 +12,7 @@ from gyrobench.arrays import Array
 
 WIDTH = 1.0  # s over which the scatter is taken
 QUIET = 0.1  # quantile of the scatter that is the noise at rest
-LOUD = 2.0  # times that: moved
+LOUD = (2.0, 4.0, 8.0, 16.0)  # times that: moved; the later ones where too few are found, as a hand held them
 LEAST = 1.0  # s of a position
 EDGE = 0.25  # of the width that is left out at both ends
 BLOCK = 4096  # windows at a time
@@ -20,33 +20,47 @@ CHANCE = 1e-4  # that a clean channel stands so long at one end
 SHORT = 16  # samples of the width at least
 
 
-def at_rest(time: Array, samples: Array) -> list[tuple[int, int]]:
-    """Return first and one past the last sample of each stretch at rest; time (n,) s, samples (n, channels).
+def at_rest(time: Array, samples: Array, least: int) -> tuple[list[tuple[int, int]], float]:
+    """Return first and one past the last sample of each stretch at rest, and how many times the quietest scatter it may
+    have: the first of LOUD with as many stretches as are needed, else the first; time (n,) s, samples (n, channels).
 
-    A gap in time of more than five steps ends a stretch.
+    A gap in time of more than five steps ends a stretch, as does a step of the level: in files of rests alone, written
+    one after the other, nothing moves between them.
     """
     steps = np.diff(time)
     h = float(np.median(steps))
     width = max(round(WIDTH / h), SHORT)
     if len(time) < 2 * width:
-        return []
+        return [], LOUD[0]
     scatter = _moving_deviation(samples, width)
     floor = np.maximum(np.quantile(scatter, QUIET, axis=0), _quantum(samples) / np.sqrt(12.0))
-    quiet = np.all(scatter <= LOUD * np.maximum(floor, 1e-300), axis=1)
-    covered = np.zeros(len(time) + 1)
-    first = np.flatnonzero(quiet)
-    np.add.at(covered, first, 1.0)
-    np.add.at(covered, first + width, -1.0)
-    still = np.cumsum(covered)[:-1] > 0.5
-    broken = np.flatnonzero(steps > 5.0 * h)
+    ratio = np.max(scatter / np.maximum(floor, 1e-300), axis=1)
+    found = [(_rests(np.flatnonzero(ratio <= loud), width, steps), loud) for loud in LOUD]
+    return next((f for f in found if len(f[0]) >= least), found[0])
+
+
+def _rests(first: NDArray[np.intp], width: int, steps: Array) -> list[tuple[int, int]]:
+    """Return the stretches of quiet windows that begin with these samples; steps: of the time (n - 1,), s."""
+    h = float(np.median(steps))
+    still, one = (_covered(first + k, width - k, steps.size + 1) for k in (0, 1))  # samples; each and the one before
+    one[1:] &= steps <= 5.0 * h
     edge = round(EDGE * width)
     found = []
     for start, end in _stretches(still):
-        cuts = [start, *(int(b) + 1 for b in broken if start <= b < end - 1), end]
+        cuts = [start, *(int(b) for b in np.flatnonzero(~one[start + 1 : end]) + start + 1), end]
         for a, b in pairwise(cuts):
-            if (b - a - 2 * edge) * h >= LEAST:
-                found.append((a + edge, b - edge))
+            a, b = a + edge * (a == start), b - edge * (b == end)  # of what moved before and after
+            if (b - a) * h >= LEAST * (1.0 - 1e-9):
+                found.append((a, b))
     return found
+
+
+def _covered(first: NDArray[np.intp], width: int, size: int) -> NDArray[np.bool_]:
+    """Return which of so many samples are in stretches of this width that begin there."""
+    count = np.zeros(size + 1)
+    np.add.at(count, first, 1.0)
+    np.add.at(count, first + width, -1.0)
+    return np.cumsum(count)[:-1] > 0.5
 
 
 def labelled(number: Array) -> list[tuple[int, int]]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gyrobench.record.clock_times import moment
+from gyrobench.record.column_map import read_map
 from gyrobench.workflow.fit_columns import write_columns
 
 
@@ -71,3 +72,64 @@ def test_a_word_before_the_quantity(tmp_path: Path) -> None:
         tmp_path, "x.csv", "imu_gyr_1,imu_gyr_2,imu_gyr_3,imu_acc_1,imu_acc_2,imu_acc_3", rows(0, 0, 0, 0, 0, 1)
     )
     assert list(found.values()) == ["deg/s"] * 3 + ["g"] * 3
+
+
+def test_a_field_of_one_before_forces_of_ten(tmp_path: Path) -> None:
+    """Angles of 0.6 and 0.8 by chance, nine columns without names: what reads 9.8 is the accelerometers."""
+    text = write_columns_of(tmp_path, rows(0.6, -0.8, 0.1, 0.2, 0.3, 0.3, 0.1, 0.2, -9.8))
+    assert re.findall(r"from = (\d)", text) == ["7", "8", "9"]
+
+
+def write_columns_of(folder: Path, lines: list[str]) -> str:
+    (folder / "x.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return write_columns(folder / "x.txt", "drift_record", None)[0]
+
+
+def test_sentences_of_an_instrument(tmp_path: Path) -> None:
+    """Twelve values behind $VNYMR: angles, field, forces in m/s2, rates in rad/s, and a checksum."""
+    lines = ["$VNYMR,-134.051,-000.443,-000.892,-00.1575,+00.1599,+00.3040," + row.replace(",", ",+0", 1) + "*68"
+             for row in rows(0.1, 0.2, 9.8, 0.001, 0.002, 0.003)]  # fmt: skip
+    text = write_columns_of(tmp_path, [line.replace("+0-", "-0") for line in lines])
+    found = re.findall(r'\[columns\.(\w+)\]\nfrom = (\d+)\nunit = "(.*)"', text)
+    assert found == [
+        *((f"acc_{a}", str(8 + k), "m/s2") for k, a in enumerate("xyz")),
+        *((f"gyro_{a}", str(11 + k), "rad/s") for k, a in enumerate("xyz")),
+    ]
+
+
+def test_what_belongs_to_a_channel_is_none(tmp_path: Path) -> None:
+    """How good it is, its size and its temperature; angle and velocity of each sample behind an address."""
+    head = "sys_time,accuracy(more=better),acc_x,acc_y,acc_z,acc_norm,gyro_temp,unit-1:deltaThetaX,unit-1:deltaVelX"
+    lines = [f"{10262 + 10 * k},3,{row},1.0,31.{k},0.0{k}1,0.0{k}2" for k, row in enumerate(rows(0.1, 0.2, 0.97))]
+    found = proposed(tmp_path, "x.csv", head, lines)
+    assert found == {
+        "time": "ms", "acc_x": "g", "acc_y": "g", "acc_z": "g", "gyro_temp": "degC", "unit_1_deltaThetaX": "rad",
+        "unit_1_deltaVelX": "m/s",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("step", "unit"), [(1, "s"), (2, "ms"), (5000, "us"), (2_500_000, "ns"), (0.01, "s")])
+def test_the_unit_of_whole_times(step: float, unit: str, tmp_path: Path) -> None:
+    """By the rate of the rows: 500, 200 and 400 a second; a step of one may be a second, a fraction is of one."""
+    lines = [f"{1000 + k * step:g},{row}" if step < 1 else f"{1000 + k * step},{row}"
+             for k, row in enumerate(rows(0.1, 0.2, 9.8))]  # fmt: skip
+    assert proposed(tmp_path, "x.csv", "timestamp,ax,ay,az", lines)["time"] == unit
+
+
+def test_counts_need_no_unit_in_positions_by_hand(tmp_path: Path) -> None:
+    """Whole numbers that are no gravity; a number of the sample is no time."""
+    values = np.round(np.array([300.0, 2.0, 4100.0, 7.0, -3.0, 5.0]) + np.random.default_rng(1).normal(size=(40, 6)))
+    lines = [",".join([str(k), *(f"{v:.0f}" for v in row)]) for k, row in enumerate(values.tolist())]
+    head = "n_samples,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z"
+    found = proposed(tmp_path, "x.csv", head, lines, "imu_positions")
+    assert found == dict.fromkeys(["gx", "gy", "gz", "ax", "ay", "az"], "counts")
+    (tmp_path / "map.toml").write_text('[columns.ax]\nfrom = "acc_x"\nunit = "counts"\n', encoding="utf-8")
+    assert read_map(tmp_path / "map.toml").columns["ax"].unit == "1"
+
+
+def test_nine_columns_of_counts_without_names(tmp_path: Path) -> None:
+    """Nothing tells which they are: what a logger's file needs is asked for, not the angles of a table."""
+    (tmp_path / "x.txt").write_text("\n".join(["31 -20 1040 70 80 90 100 200 30"] * 20 + [""]), encoding="utf-8")
+    text, problems = write_columns(tmp_path / "x.txt", "imu_positions", None)
+    assert 'attitudes = "unknown"' in text and not any("outer" in p for p in problems)
+    assert [p[8:10] for p in problems if p.startswith("column")] == ["gx", "gy", "gz", "ax", "ay", "az"]

@@ -152,13 +152,13 @@ def test_positions_are_found() -> None:
     """The stretches at rest of a series, within half the width of the detector; two seconds of gap end one."""
     rng = np.random.default_rng(4)
     time, gyro, acc = handled(Unit.drawn(rng), poses(rng, 12), rng, gyro=GYRO, acc=ACC)
-    found = still.at_rest(time, np.column_stack([gyro, acc]))
-    assert len(found) == 12
+    found, loud = still.at_rest(time, np.column_stack([gyro, acc]), 10)
+    assert len(found) == 12 and loud == 2.0
     for k, (a, b) in enumerate(found):
         # at rest from 6 k to 6 k + 4 s; a cycloid begins and ends so gently that some tenths of a second pass
         assert 6.0 * k - 0.6 <= time[a] and time[b - 1] <= 6.0 * k + 4.6 and b - a > 300
     broken = time + np.where(np.arange(time.size) >= 200, 2.0, 0.0)
-    assert len(still.at_rest(broken, np.column_stack([gyro, acc]))) == 13 or len(found) == 12
+    assert len(still.at_rest(broken, np.column_stack([gyro, acc]), 10)[0]) == 13 or len(found) == 12
     assert still.labelled(np.array([0.0, 1.0, 1.0, math.nan, 2.0, 2.0, 0.0])) == [(1, 3), (4, 6)]
 
 
