@@ -33,6 +33,8 @@ from gyrobench.workflow import axes_of_gravity
 from gyrobench.workflow.empty_record import empty_record
 from gyrobench.workflow.inputs import load_test
 
+HEAD = 4096  # characters of a file that may state where it was recorded
+PLACE = re.compile(r"^#\s*(latitude|gravity)\s*=", re.MULTILINE)
 OPTIONAL = ("std", "n", "flagged")
 COUNTED = "counts"  # unit of readings that are whole numbers
 COUNTS = "counts"  # option, of columns that are called as the angle or velocity of each sample
@@ -102,10 +104,15 @@ class ColumnProposal:
             entry = f"[columns.{name}] with from = {source}{unit}"
             none = f"column '{name}': none of the file fits by name and unit"
             problems.append(f"{none}; write {entry}; not used so far: {unused}")
-        if "attitudes" in self.stated:
+        if "attitudes" in self.stated and not PLACE.search(_head(self.text_file)):
             alone = "" if any(n[0] == "g" for n in self.wanted) else ", or the gravity there"
             problems.append(f'latitude of the place{alone}: write latitude = "45.75deg" below [set]')
         return text, problems
+
+
+def _head(file: Path) -> str:
+    with file.open(encoding="latin-1") as text:
+        return text.read(HEAD)
 
 
 def propose_columns(file: Path, system: str) -> ColumnProposal:

@@ -118,10 +118,14 @@ class HandReduction(ChannelTests[HandSetup]):
         ]
 
     def reasons(self) -> list[Reason]:
+        if self.at.enough and not self.at.carried.all():
+            first, last = (int(k) + 1 for k in np.flatnonzero(self.at.carried)[[0, -1]])
+            text = f"Samples of turns are missing: Sg rests on those from position {first} to {last} alone."
+            return [Reason("turns.some", text)]
         if self.at.enough or not self.at.gyro.size:
             return []
         text = (
-            "There are no samples of the turns between the positions, or not of all, or fewer than 6 turns; not "
+            "There are no samples of the turns between the positions, or of fewer than 6 one after the other; not "
             "estimable: Sg (scale factors and misalignments of the gyros)."
         )
         if self.blind:

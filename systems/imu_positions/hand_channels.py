@@ -37,6 +37,10 @@ ESTIMATED = 16  # positions from which on the noise of a gyro at rest is estimat
 LEVEL_RATE = Source(
     "earth.rate.level", "level Earth rate, its heading not known", "rad/s", "", "amplitude along two level directions"
 )
+OWN_LEVEL_RATE = Source(
+    "earth.rate.apart", "level Earth rate where turns lack samples, its heading not known", "rad/s", "",
+    "amplitude along two level directions",
+)  # fmt: skip
 ORDERED = 0.2  # least share of a trend of a bias that the other unknowns of accelerometers leave
 WHITE = "noise of the instrument and what the model does not hold, from the residuals"
 CONVENTIONS = [
@@ -234,10 +238,15 @@ class HandGyro(HandChannel):
         at, c, s = self.at, self.channel, self.setup
         level = np.array([d[:, c.axis] for d in at.found.level])  # (n, 2)
         vertical = sources.LATITUDE.effect(s, -s.earth_rate * math.cos(s.latitude) * at.up[:, c.axis])
+        effects = [vertical]
         if at.enough:
-            return [vertical, LEVEL_RATE.effect(self.level[1], level.T.copy(), parts=("first", "second"))]
-        own = np.concatenate([np.diag(level[:, 0]), np.diag(level[:, 1])])  # a heading of its own each
-        return [vertical, LEVEL_RATE.effect(at.level_size, own)]
+            carried = (level * at.carried[:, None]).T.copy()
+            effects.append(LEVEL_RATE.effect(self.level[1], carried, parts=("first", "second")))
+        if not at.carried.all():
+            alone = level * ~at.carried[:, None]  # a heading of its own each
+            own = np.concatenate([np.diag(alone[:, 0]), np.diag(alone[:, 1])])
+            effects.append((OWN_LEVEL_RATE if at.enough else LEVEL_RATE).effect(at.level_size, own))
+        return effects
 
 
 def _in_counts(S: Array, D: float) -> Array:

@@ -6,10 +6,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyrobench import frames
 from gyrobench.arrays import Array
@@ -142,8 +144,8 @@ class Positions:
 
     @cached_property
     def raw_turns(self) -> list[Turn]:
-        """Turns between neighbouring positions, readings less those at rest, before a scale factor is known; none where
-        samples of one are missing.
+        """Turns between neighbouring positions, readings less those at rest, before a scale factor is known: the
+        longest row of turns of which no sample is missing, as the heading is lost where one is.
         """
         if self.setup.samples is None:
             return []
@@ -154,8 +156,17 @@ class Positions:
             steps = np.diff(time[rows])
             if steps.size > 1 and np.max(steps) < GAP * np.median(steps):
                 bias = 0.5 * (self.gyro[k] + self.gyro[k + 1])
-                found.append(Turn(time[rows], read[rows] - bias, self.up[k], self.up[k + 1]))
-        return found if len(found) == len(self.start) - 1 else []
+                found.append(Turn(time[rows], read[rows] - bias, self.up[k], self.up[k + 1], k))
+        cuts = [0, *(k + 1 for k, (a, b) in enumerate(pairwise(found)) if b.at != a.at + 1), len(found)]
+        return max((found[a:b] for a, b in pairwise(cuts)), key=len)
+
+    @cached_property
+    def carried(self) -> NDArray[np.bool_]:
+        """Positions (n,) whose heading the turns carry on from one to the other."""
+        inside = np.zeros(len(self.start), dtype=bool)
+        if self.enough:
+            inside[self.raw_turns[0].at : self.raw_turns[-1].at + 2] = True
+        return inside
 
     @cached_property
     def labels(self) -> tuple[float, Array]:
@@ -178,36 +189,43 @@ class Positions:
         if not self.enough:
             return TurnSolution([], matrix, level, np.zeros_like(self.up), u)
         for _ in range(ROUNDS):
-            earth = self.vertical + np.array([rate @ d for d in level])
+            earth = self.vertical + self._along(level, rate)
             inverse = np.asarray(np.linalg.inv(np.eye(3) + matrix), dtype=float)
             G = self._sensitivity(earth, matrix)
-            turned = [self._turn(k, t, earth, rate @ level[k], G, inverse) for k, t in enumerate(self.raw_turns)]
+            turned = [self._turn(t, earth, rate @ level[t.at], G, inverse) for t in self.raw_turns]
             matrix = turns.solve(turned, matrix)
-            level = turns.headings(turned, np.asarray(np.linalg.inv(np.eye(3) + matrix)), self.up[0])
+            first = turned[0].at
+            known = turns.headings(turned, np.asarray(np.linalg.inv(np.eye(3) + matrix)), self.up[first])
+            level[first : first + len(known)] = known
             rate, u = self._level_rate(level, matrix)
-        return TurnSolution(turned, matrix, level, np.array([rate @ d for d in level]), u)
+        return TurnSolution(turned, matrix, level, self._along(level, rate), u)
+
+    def _along(self, level: list[Array], rate: Array) -> Array:
+        """Return the level Earth rate (n, 3) with these parts along the level directions, 0 where none are known."""
+        return np.array([rate @ d for d in level]) * self.carried[:, None]
 
     def _sensitivity(self, earth: Array, matrix: Array) -> Array:
         """Return the g-sensitivity (3, 3), rad/s per g0, from the readings at rest; earth: Earth rate there (n, 3)."""
         y = self.gyro / self.scale_g - earth @ (np.eye(3) + matrix).T
         return np.asarray(np.linalg.lstsq(self.own, y, rcond=None)[0][1:].T)
 
-    def _left(self, rates: Array) -> Array:
-        """Return what bias and g-sensitivity leave of rates (n, k) at rest."""
-        return np.asarray(rates - self.own @ np.linalg.lstsq(self.own, rates, rcond=None)[0])
+    def _left(self, rates: Array, rows: slice | NDArray[np.bool_] = slice(None)) -> Array:
+        """Return what bias and g-sensitivity leave of rates (n, k) at rest, in these rows."""
+        own, rates = self.own[rows], rates[rows]
+        return np.asarray(rates - own @ np.linalg.lstsq(own, rates, rcond=None)[0])
 
-    def _turn(self, k: int, t: Turn, earth: Array, level: Array, G: Array, inverse: Array) -> Turn:
+    def _turn(self, t: Turn, earth: Array, level: Array, G: Array, inverse: Array) -> Turn:
         """Return a turn with readings over D, the Earth rate (n, 3) of the positions in them; level (3,): at the start.
 
         The bias is what is read at rest less the Earth rate there; the turning Earth carries the start along.  Gravity
         turns with the case, and what the gyros read of it (G) changes against its mean at both ends, which the bias
         holds.
         """
-        span = float(t.time[-1] - t.time[0])
+        k, span = t.at, float(t.time[-1] - t.time[0])
         rate = t.rate / self.scale_g + 0.5 * (earth[k] + earth[k + 1])
         up = Turn(t.time, rate, t.before, t.after).path(inverse)
         change = (self.setup.gravity * up - 0.5 * (self.force[k] + self.force[k + 1])) / frames.G0
-        return Turn(t.time, rate - change @ G.T, t.before + span * np.cross(level, t.before), t.after)
+        return replace(t, rate=rate - change @ G.T, before=t.before + span * np.cross(level, t.before))
 
     def level_by_others(self, axis: int) -> tuple[Array, float]:
         """Return the level Earth rate (n, 3) at each position as the two other gyros show it, and its u: the fit of
@@ -217,16 +235,16 @@ class Positions:
         if not self.enough:
             return found.rate, found.u
         rate, u = self._level_rate(found.level, found.matrix, [k for k in range(3) if k != axis])
-        return np.array([rate @ d for d in found.level]), u
+        return self._along(found.level, rate), u
 
     def _level_rate(self, level: list[Array], matrix: Array, gyros: Sequence[int] = (0, 1, 2)) -> tuple[Array, float]:
         """Return the level Earth rate along both level directions (2,), and the standard uncertainty of each: from what
         these gyros read at rest, and from its size, which is known.
         """
-        n, K = len(self.up), np.eye(3) + matrix
+        n, K = int(np.count_nonzero(self.carried)), np.eye(3) + matrix
 
         def left(v: Array) -> Array:
-            return self._left(v[:, list(gyros)]).T.ravel()
+            return self._left(v[:, list(gyros)], self.carried).T.ravel()
 
         data = left(self.gyro / self.scale_g - self.vertical @ K.T)
         X = np.column_stack([left(d @ K.T) for d in np.swapaxes(np.array(level), 0, 1)])

@@ -45,7 +45,8 @@ def of_level_rate(at: Positions) -> Array:
     clean = turns.left(own.turned, own.matrix)
     for axis in range(2):
         moved = []
-        for k, t in enumerate(own.turned):
+        for t in own.turned:
+            k = t.at
             rest = 0.5 * (own.level[k][axis] + own.level[k + 1][axis])
             span = float(t.time[-1] - t.time[0])
             before = t.before + STEP * span * np.cross(own.level[k][axis], t.before)
@@ -71,9 +72,7 @@ def of_accelerometers(at: Positions) -> Array:
     across = (np.eye(3) - at.up[:, :, None] * at.up[:, None, :]) / np.linalg.norm(at.force, axis=1)[:, None, None]
     directions = (across @ forces.reshape(count, 3, -1)).reshape(count, 3, -1)
     inverse = np.asarray(np.linalg.inv(np.eye(3) + at.found.matrix), dtype=float)
-    rows = [
-        t.tangents @ (t.rotation(inverse).T @ directions[k] - directions[k + 1]) for k, t in enumerate(at.found.turned)
-    ]
+    rows = [t.tangents @ (t.rotation(inverse).T @ directions[t.at] - directions[t.at + 1]) for t in at.found.turned]
     return np.concatenate(rows).T
 
 
@@ -88,8 +87,8 @@ def of_gyros(at: Positions) -> Array:
         half = 0.5 * STEP * np.eye(3)[axis]
         moved = [Turn(t.time, t.rate - half, t.before, t.after) for t in own.turned]
         change = (turns.left(moved, own.matrix) - clean) / STEP
-        for k in range(len(own.turned)):
+        for k, t in enumerate(own.turned):
             both = slice(2 * k, 2 * k + 2)
-            out[k, axis, both] += change[both]
-            out[k + 1, axis, both] += change[both]
+            out[t.at, axis, both] += change[both]
+            out[t.at + 1, axis, both] += change[both]
     return out.reshape(-1, 2 * len(own.turned))

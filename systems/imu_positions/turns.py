@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -25,16 +26,20 @@ GUESSES = 90  # of a scale factor that is not known
 TURNED = (0.15, 15.0)  # rad, between which the mean turn lies where it is not known
 GOOD = 0.15  # rad: a turn by hand is found to some degrees with nominal scale factors
 FEW = 12  # turns that a guess looks at
+COARSE = 64  # steps of such a turn: 0.25 rad each at most
 
 
 @dataclass(frozen=True)
 class Turn:
-    """One turn: times (m,), readings over D less the bias (m, 3), directions of gravity before and after (3,)."""
+    """One turn: times (m,), readings over D less the bias (m, 3), directions of gravity before and after (3,); at: the
+    position before it.
+    """
 
     time: Array
     rate: Array
     before: Array
     after: Array
+    at: int = 0
 
     def rotations(self, inverses: Array) -> Array:
         """Return Q (b, 3, 3) for several inverses (b, 3, 3) of 1 + S; columns: axes afterwards in those before."""
@@ -42,6 +47,18 @@ class Turn:
         h = np.diff(self.time)[:, None]
         vector = 0.5 * h * (w[:, 1:] + w[:, :-1]) + h * h / 12.0 * np.cross(w[:, :-1], w[:, 1:])
         return _product(vector)
+
+    def thinned(self, steps: int) -> Turn:
+        """Return the turn in so many steps at most, each the mean of its rates: for a guess, no fit."""
+        every = -(-(self.time.size - 1) // steps)
+        if every < 2:
+            return self
+        cuts = np.minimum(np.arange(0, self.time.size - 1 + every, every), self.time.size - 1)
+        mean = np.diff(cumulative_trapezoid(self.rate, self.time, axis=0, initial=0.0)[cuts], axis=0)
+        mean /= np.diff(self.time[cuts])[:, None]
+        middle = 0.5 * (self.time[cuts][1:] + self.time[cuts][:-1])
+        time = np.concatenate([self.time[:1], middle, self.time[-1:]])
+        return replace(self, time=time, rate=np.concatenate([mean[:1], mean, mean[-1:]]))
 
     def path(self, inverse: Array) -> Array:
         """Return the direction of gravity (m, 3) at each sample, as the gyros carry it on from the start."""
@@ -150,7 +167,8 @@ def factor(turns: list[Turn]) -> float:
 
 
 def _largest(turns: list[Turn]) -> list[Turn]:
-    return sorted(turns, key=lambda t: -float(np.max(np.abs(t.before - t.after))))[:FEW]
+    """Return the turns that a guess looks at, those that carry gravity farthest, in few steps each."""
+    return [t.thinned(COARSE) for t in sorted(turns, key=lambda t: -float(np.max(np.abs(t.before - t.after))))[:FEW]]
 
 
 def _offs(turns: list[Turn], matrices: Array) -> Array:
