@@ -336,7 +336,7 @@ def of_motion(columns: Columns) -> list[Reason]:
         Reason(
             "drift_record.moved",
             f"The instrument was not at rest at {', '.join(spans)}{more}: its readings move by {TIMES:g} times their "
-            f"noise and more. {number(columns.step * columns.moved.sum())} s are left out.",
+            f"noise, or turn by 10 °/s, and more. {number(columns.step * columns.moved.sum())} s are left out.",
         )
     ]
 

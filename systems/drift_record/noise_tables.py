@@ -66,8 +66,8 @@ def _disagreement(noise: NoiseModel) -> str:
         )
     if noise.restless:
         return (
-            f"in {_percent(noise.restless)} of the record the readings move by {TIMES:g} times the noise of the rest "
-            "and more: the instrument was not at rest, or its noise is not one"
+            f"in {_percent(noise.restless)} of the record the readings move by {TIMES:g} times the noise of the rest, "
+            "or turn by 10 °/s, and more: the instrument was not at rest, or its noise is not one"
         )
     if noise.rounded_away:
         return (

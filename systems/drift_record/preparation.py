@@ -18,7 +18,7 @@ from gyrobench.reduction.series.channel_units import FORCE, RATE, ChannelUnits, 
 from gyrobench.reduction.series.checks import SeriesError
 from gyrobench.reduction.series.drift_model import DriftModel, describe
 from gyrobench.reduction.series.lines import Lines
-from gyrobench.reduction.series.motion import MOST, moved
+from gyrobench.reduction.series.motion import MOST, moved, turned
 from gyrobench.reduction.series.row_pattern import RowPattern, every_second_row
 from gyrobench.reduction.setup import run_metadata
 from gyrobench.reduction.toolkit import Array, Record, ReductionError, attitude_of, plain
@@ -111,6 +111,8 @@ def columns_of(record: Record) -> Columns:
         units = {n: units_of(run.window_units.get(n, "")) for n in rates}
         others, named, left = with_rates_of_change(others, run.window_units, step)
         found = moved(rates, step)
+        if gyros := [v for n, v in rates.items() if units[n] is RATE]:
+            found |= turned(gyros, step)
         restless = float(found.mean())
         if cut := 0.0 < restless <= MOST:
             rates = {n: np.where(found, np.nan, v) for n, v in rates.items()}

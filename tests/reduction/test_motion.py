@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gyrobench.arrays import Array
-from gyrobench.reduction.series.motion import MOST, moved
+from gyrobench.reduction.series.motion import MOST, moved, turned
 
 N, STEP = 40_000, 0.01
 
@@ -51,3 +51,13 @@ def test_a_record_that_is_louder_for_a_third_of_it() -> None:
     """Thirty times from 0.7 on, blocks 560 to 800: found, with the block beside them, and too much to leave out."""
     found = moved({"x": noise("white") * np.where(np.arange(N) < 0.7 * N, 1.0, 30.0)}, STEP)
     assert found.mean() == pytest.approx(241 / 800) and found.mean() > MOST
+
+
+def test_turned_smoothly_for_most_of_the_record() -> None:
+    """A turntable at 1 rad/s and back, each for a third: no block stands out by its scatter, two thirds by their level.
+    A bias that changes by 9 degrees a second (0.157 rad/s) is one, however odd."""
+    third = np.arange(N) * 3 // N
+    rate = 1e-3 * noise("white") + np.array([0.0, 1.0, -1.0])[third]
+    assert moved({"x": rate}, STEP).mean() < 0.01
+    assert turned([1e-3 * noise("white"), rate], STEP).mean() == pytest.approx(2.0 / 3.0, abs=0.01)
+    assert not turned([1e-3 * noise("white") + 0.157 * np.arange(N) / N], STEP).any()
