@@ -78,7 +78,7 @@ CLOCK = "((sys(tem)?|gps|log|device|sensor|unix|utc|epoch)_?)"
 CALLED = {
     "t_start": r"t_?start|start|beginn|begin|von|from|zeit.*|time.*|datum.*|date.*|uhrzeit|t",
     "t_end": r"t_?end|ende?|bis|stop|to|until",
-    "time": rf"{CLOCK}?time.*|.*stamp|zeit.*|datum.*|date.*|uhrzeit|x_value|ts?|seconds.*|elapsed.*",
+    "time": rf"{CLOCK}?time.*|.*stamp(_.*)?|zeit.*|datum.*|date.*|uhrzeit|x_value|ts?|seconds.*|elapsed.*",
     "phase": r"phase.*|lage.*|abschnitt.*|stellung.*",
     "day": r"day|tag",
     "mean": r"mean.*|mittel.*|strom.*|current.*|i|spannung.*|voltage.*",
@@ -349,6 +349,8 @@ def _likeness(wanted: str, unit: str, column: FileColumn) -> int:
     if base and re.fullmatch(CALLED[base], _plain(column.name)):
         ending = wanted[len(base) :]
         return 3 if not ending or _plain(column.name).endswith(ending) else 0
+    if column.unit and re.fullmatch(r"[ag][xyz]", wanted) and _plain(column.name) in "xyz":
+        return 2 * (_plain(column.name) == wanted[1])  # of a file of one triad, whose unit tells which
     return 1 if column.unit and unit not in ("", "1", "s") else 0
 
 

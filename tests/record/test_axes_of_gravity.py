@@ -133,3 +133,11 @@ def test_nine_columns_of_counts_without_names(tmp_path: Path) -> None:
     text, problems = write_columns(tmp_path / "x.txt", "imu_positions", None)
     assert 'attitudes = "unknown"' in text and not any("outer" in p for p in problems)
     assert [p[8:10] for p in problems if p.startswith("column")] == ["gx", "gy", "gz", "ax", "ay", "az"]
+
+
+def test_positions_of_a_file_of_one_triad(tmp_path: Path) -> None:
+    """Axes with their unit, and milliseconds since 1970 behind a word and a place."""
+    lines = [f"{1570546289843 + 5 * k}\t" + row.replace(",", "\t").replace(".", ",")
+             for k, row in enumerate(rows(0.3, 0.1, 9.8))]  # fmt: skip
+    found = proposed(tmp_path, "x.txt", "TStamp Europe/Rome\tX [m/s²]\tY [m/s²]\tZ [m/s²]", lines, "imu_positions")
+    assert found == {"time": "ms", "ax": "m/s²", "ay": "m/s²", "az": "m/s²"}
