@@ -23,6 +23,7 @@ from gyrobench.record.csv_reader import CsvColumn, DataError, Head
 from gyrobench.record.drift_columns import named, open_table
 from gyrobench.record.first_cells import COUNTS
 from gyrobench.record.record import Record
+from gyrobench.reduction.estimation.sentences import plain
 from gyrobench.system.lab_record import TEXTS, measured_run, set_options
 from gyrobench.system.system import System
 
@@ -77,12 +78,12 @@ def read_log(system: System, data: Path, values: Mapping[str, str]) -> Record:
     time, every, problems = _checked(samples, mine, norms.LEAST if means else 2 * still.SHORT)
     if problems:
         raise DataError(data, problems)
-    notes: list[str] = []
+    notes, loud = list[str](), still.LOUD[0]
     if means:
         windows = _means(time, every, mine)
     else:
         least = 2 if up_down else norms.LEAST
-        windows, problems, notes = _windows(time, every, mine, samples, least, PIECES if up_down else 1)
+        windows, problems, notes, loud = _windows(time, every, mine, samples, least, PIECES if up_down else 1)
     if problems:
         raise DataError(data, problems)
     said = {**table.head.comments, **values}
@@ -95,6 +96,7 @@ def read_log(system: System, data: Path, values: Mapping[str, str]) -> Record:
     run.units = {n: si["gx"] for n in channels if n != "time"}
     run.notes = notes
     run.doubts = _coarse(time, every, mine, windows, si)
+    run.doubts += [_leaned(windows, loud)] if loud > still.LOUD[0] else []
     run.doubts += [] if up_down or not gyros else lost.doubts(time, every[:, :3])
     return Record(windows, channels if gyros else {}, run)
 
@@ -152,18 +154,15 @@ def _means(time: Array, every: Array, mine: Sequence[ImuInstrument]) -> dict[str
 
 def _windows(
     time: Array, every: Array, mine: Sequence[ImuInstrument], samples: Mapping[str, Array], least: int, pieces: int
-) -> tuple[dict[str, AnyArray], list[str], list[str]]:
-    """Return a row for each of so many pieces of each position at rest, what is wrong with them, and notes."""
-    notes = []
+) -> tuple[dict[str, AnyArray], list[str], list[str], float]:
+    """Return a row for each of so many pieces of each position at rest, what is wrong with them, notes, and how many
+    times the quietest scatter they may have.
+    """
+    notes, loud = list[str](), still.LOUD[0]
     if "position" in samples:
         found = [(a, b) for a, b in still.labelled(samples["position"]) if b - a >= FEW]
     else:
         found, loud = still.at_rest(time, every, least)
-        if loud > still.LOUD[0]:
-            notes.append(
-                f"Positions at rest are the stretches that scatter up to {loud:g} times as much as the quietest tenth "
-                "of the record, as if a hand held the case: of up to twice as much there are too few."
-            )
         scatter = np.array([every[a:b].std(axis=0) for a, b in found]).reshape(-1, len(mine))
         crept = np.any(scatter > MOVED * np.maximum(np.median(scatter, axis=0), 1e-300), axis=1) & (len(found) > 0)
         if crept.any():
@@ -180,6 +179,7 @@ def _windows(
             {},
             [f"{len(found)} positions at rest {how}; at least {least} in different directions are needed for {why}"],
             notes,
+            loud,
         )
     cuts = [np.linspace(a, b - 1, min(pieces, (b - a) // FEW) + 1).astype(int) for a, b in found]
     rows = [(k, a, b) for k, c in enumerate(cuts, 1) for a, b in pairwise(c.tolist())]
@@ -191,7 +191,21 @@ def _windows(
     rest = np.zeros(time.size, dtype=bool)
     for a, b in found:
         rest[a:b] = True
-    return out, _moved(out, mine) + _clipped(time, every, mine, rest), notes
+    return out, _moved(out, mine) + _clipped(time, every, mine, rest), notes, loud
+
+
+def _leaned(windows: Mapping[str, AnyArray], loud: float) -> str:
+    """Return that positions were held by a hand, whose leaning makes the mean force smaller: by half its variance over
+    the square of the force.
+    """
+    square, variance = (sum(windows[f"{kind}_a{x}"] ** 2 for x in "xyz") for kind in ("mean", "std"))
+    most = plain(1e6 * float(np.max(0.5 * variance / square)), 2)
+    return (
+        f"Positions at rest are the stretches that scatter up to {loud:g} times as much as the quietest tenth of the "
+        "record, as if a hand held the case: of up to twice as much there are too few. Where it leans meanwhile the "
+        f"mean force is smaller, in all positions alike: scale factors may be up to {most} ppm too small, and no "
+        "residual shows it. Put the case down."
+    )
 
 
 def _coarse(

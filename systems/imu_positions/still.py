@@ -12,7 +12,7 @@ from gyrobench.arrays import Array
 
 WIDTH = 1.0  # s over which the scatter is taken
 QUIET = 0.1  # quantile of the scatter that is the noise at rest
-LOUD = (2.0, 4.0, 8.0, 16.0)  # times that: moved; the later ones where too few are found, as a hand held them
+LOUD = (2.0, 4.0, 8.0)  # times that: moved; the later ones where too few are found, as a hand held them
 LEAST = 1.0  # s of a position
 EDGE = 0.25  # of the width that is left out at both ends
 BLOCK = 4096  # windows at a time
