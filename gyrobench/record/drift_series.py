@@ -199,7 +199,9 @@ class DriftReader:
         if float(np.median(off)) > UNEVEN:
             raise ValueError(
                 f"the samples are not evenly spaced: steps from {float(d.min()):.4g} to {float(chunks[even].max()):.4g}"
-                " s; deviations and spectra need an even grid: resample the record, and say so"
+                " s; deviations and spectra need an even grid: resample the record, and say so. If only the stamps are "
+                "uneven, as those of a computer, and the instrument samples evenly, leave the column time out (of the "
+                f"column map) and state its rate: sampling = {1.0 / float(chunks[even].mean()):.4g}Hz"
             )
         other = np.flatnonzero(np.abs(usual / step - 1.0) > MIXED)
         if other.size:

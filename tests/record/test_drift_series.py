@@ -167,6 +167,7 @@ PAIRS = np.cumsum(np.where(np.arange(N) % 2 == 0, 0.01, 0.004))
         ({"time [s]": TWO, "rate [deg/h]": RATE}, "", "the sampling changes from 0.01 s to 0.1 s at about row"),
         ({"time [s]": BURSTS, "rate [deg/h]": RATE}, "", "come in bursts, 0.002 s apart with a mean of 0.0"),
         ({"time [s]": PAIRS, "rate [deg/h]": RATE}, "", "not evenly spaced: steps from 0.004 to 0.01 s"),
+        ({"time [s]": PAIRS, "rate [deg/h]": RATE}, "", "its rate: sampling = 142.9Hz"),  # means of 0.007 s
         ({"time": TIME, "rate [deg/h]": RATE}, "", "column 'time': no unit; write 'time [s]'"),
         ({"time [kg]": TIME, "rate [deg/h]": RATE}, "", "column 'time': wrong unit [kg]"),
         ({"time [s]": TIME, "rate": RATE}, "", "column 'rate': no unit; a drift record holds a rate [deg/h]"),
