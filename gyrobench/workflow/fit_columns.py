@@ -48,7 +48,7 @@ TURN = r"(theta|th|ang\w*|rot\w*|phi)"
 LIKELY = {
     OTHER + rf"(.*delta|.*incr\w*|d)_?{TURN}(_?[xyz])?": "rad",
     OTHER + r"(.*delta|.*incr\w*|d)_?v(el\w*)?(_?[xyz])?": "m/s",
-    OTHER + r"((\w+_)?gyr.*|omega.*|[gw]_?[xyz]|(dreh)?rat.*|.*(angular|rotation)_?(rate|vel).*)": "deg/s",
+    OTHER + r"((\w+_)?gyr.*|omega.*|[gw]_?[xyz]|(dreh)?rat.*|rot\d|.*(angular|rotation)_?(rate|vel).*)": "deg/s",
     OTHER + r"((\w+_)?acc.*|.*accel.*|beschl.*|[af]_?[xyz])": "m/s2",
     r".*temp.*": "degC",
 }

@@ -99,12 +99,14 @@ def test_sentences_of_an_instrument(tmp_path: Path) -> None:
 
 def test_what_belongs_to_a_channel_is_none(tmp_path: Path) -> None:
     """How good it is, its size and its temperature; angle and velocity of each sample behind an address."""
-    head = "sys_time,accuracy(more=better),acc_x,acc_y,acc_z,acc_norm,gyro_temp,unit-1:deltaThetaX,unit-1:deltaVelX"
-    lines = [f"{10262 + 10 * k},3,{row},1.0,31.{k},0.0{k}1,0.0{k}2" for k, row in enumerate(rows(0.1, 0.2, 0.97))]
+    head = (
+        "sys_time,accuracy(more=better),acc_x,acc_y,acc_z,acc_norm,gyro_temp,rot0,unit-1:deltaThetaX,unit-1:deltaVelX"
+    )
+    lines = [f"{10262 + 10 * k},3,{row},1.0,31.{k},0.1,0.0{k}1,0.0{k}2" for k, row in enumerate(rows(0.1, 0.2, 0.97))]
     found = proposed(tmp_path, "x.csv", head, lines)
     assert found == {
-        "time": "ms", "acc_x": "g", "acc_y": "g", "acc_z": "g", "gyro_temp": "degC", "unit_1_deltaThetaX": "rad",
-        "unit_1_deltaVelX": "m/s",
+        "time": "ms", "acc_x": "g", "acc_y": "g", "acc_z": "g", "gyro_temp": "degC", "rot0": "deg/s",
+        "unit_1_deltaThetaX": "rad", "unit_1_deltaVelX": "m/s",
     }  # fmt: skip
 
 
