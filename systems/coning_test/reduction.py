@@ -1,13 +1,14 @@
 """Reduction of the coning test: drift of the attitude by each cone, along x, y and z, against the rest between them.
 
-    drift_i = b_i + sum_k d_ik [reading at the cone k] + noise
+    drift_i = b_i q_i + sum_k d_ik [reading at the cone k] + noise
 
+q is 1 at rest; on a cone the gyros lean, and of a bias cos theta is left along its axis, (1 + cos theta)/2 across it.
 Each axis is a linear fit of its own under an estimated noise model, with a trend weighed by the data.  Beside the
 estimates stands what the closed form makes of the stated filter, output rate and algorithm with gyros without error;
 what is left of the drift are scale factors and misalignments.  [TEST-CONING; Goodman 1958]
 
-Not modelled: cones that are no circles, drift that follows the inclination other than by the cone (bias and
-g-sensitivity along axes that lean by the half-angle: its square of them).
+Not modelled: cones that are no circles, drift that follows the inclination other than by the cone and that of a bias:
+of a g-sensitivity as much is in u.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from gyrobench.units import DEG, DPH
 
 from . import mistakes
 from .closed import AXES, Chain, cone_rate
-from .sources import HALF_ANGLE, TWIST
+from .sources import HALF_ANGLE, LEANING, TWIST
 
 COLUMNS = ("t_start", "t_end", *(f"drift_{a}" for a in AXES))
 LEAST = 2  # readings at rest, and at each cone
@@ -93,7 +94,7 @@ class ConingAxis(DriftReduction[ConingSetup]):
         for name, (f, theta) in zip(c.names(self.axis), c.cones, strict=True):
             meaning = f"drift along {self.axis} by coning at {hertz(f)}, half-angle {plain(theta / DEG, 4)}°"
             quantities.append(Quantity.of(name, meaning, "deg/h", truth.get(name)))
-        X = np.column_stack([np.ones(number.size), *(number == k for k in range(len(c.cones)))]).astype(float)
+        X = np.column_stack([self.mean_cosine, *(number == k for k in range(len(c.cones)))]).astype(float)
         t0, t1 = (np.asarray(self.windows[n], dtype=float) for n in ("t_start", "t_end"))
         shown = [
             Group("at rest" if k < 0 else "cones", np.flatnonzero(at), np.abs(self.frequency[at]), "frequency", "Hz")
@@ -102,6 +103,13 @@ class ConingAxis(DriftReduction[ConingSetup]):
         y = self.means[:, own]
         candidates = nuisances.common(self.windows, f" {self.axis}") if s.nuisances else ()
         return Regression(quantities, X, y, t0, t1, shown, "drift", candidates=candidates)
+
+    @property
+    def mean_cosine(self) -> Array:
+        """Part (n,) of a bias that its axis, which goes round the cone, shows along its mean direction."""
+        cosine = np.cos(np.where(self.cones.number >= 0, np.asarray(self.windows["half_angle"], dtype=float), 0.0))
+        out: Array = cosine if self.axis == self.setup.axis else 0.5 * (1.0 + cosine)
+        return out
 
     @property
     def frequency(self) -> Array:
@@ -131,6 +139,9 @@ class ConingAxis(DriftReduction[ConingSetup]):
         theta = np.asarray(self.windows["half_angle"], dtype=float)
         grown = theta / np.tan(np.where(theta, theta, 1.0) / 2.0)  # theta sin theta/(1 - cos theta)
         out.append(HALF_ANGLE.effect(s, found.error(self.by_cones[:, own] * grown)))
+        rest = self.means[self.cones.number < 0].mean(axis=0)
+        leans = 1.0 - np.cos(np.where(self.cones.number >= 0, theta, 0.0))
+        out.append(LEANING.effect(float(np.max(np.abs(rest))), found.error(leans)))
         return [*out, TIME_BASE.effect(s, found.error(-self.means[:, own]))]
 
     def account(self, found: Findings) -> Account:

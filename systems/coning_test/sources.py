@@ -10,3 +10,7 @@ TWIST = Source(
     "table.twist", "steady turn of the table about the axis of the cone", "rad/s", "u_twist",
     doc="std. unc. of a steady turn of the table about the axis of the cone",
 )  # fmt: skip
+LEANING = Source(
+    "cone.leaning", "g-sensitivity of gyros that lean by the half-angle", "rad/s",
+    note="as if all the drift at rest were it; times 1 − cos θ",
+)  # fmt: skip

@@ -26,7 +26,7 @@ from gyrobench import frames
 from gyrobench.reduction.drift import small_rates
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.level_shift import jumped
-from gyrobench.reduction.estimation.unshown_columns import intervals_with
+from gyrobench.reduction.estimation.unshown_columns import heating, intervals_with
 from gyrobench.reduction.setup.rate_gyro_bias import bias_is_all, dithered, whole_angle, worded
 from gyrobench.reduction.setup.sources import ANGLE_ONCE, ANGLE_TWICE, AXIS_VERTICAL_EAST, COSINE, LATITUDE, TIME_BASE
 from gyrobench.reduction.toolkit import (
@@ -54,6 +54,7 @@ from . import handling, residuals, tables
 from .steps import cycle_of, direction, levels
 
 LEAST = 8  # readings of the sweep
+SHOWN = 0.01  # probability of a shape by chance, below which the report says what it changes
 PERIOD = 0.5 * math.pi  # of the drift of a whole-angle gyro, in the angle of its pattern
 
 
@@ -160,21 +161,47 @@ class Reduction(DriftReduction[RateTableSetup]):
             nuisances.Candidate.of("dead band", "rate lacking at large rates in either sense", "deg/h", -self.sense)
         ]
 
-    def _unmeasured(self, found: Sequence[Coefficient]) -> list[Reason]:
-        """Return what the coefficients may be with a dead band and a lock-in that no small rate has shown."""
-        if self.small.rate.size:
-            return []
-        still, w = self.sense == 0.0, self.w[self.large]
-        more = np.column_stack([self.sense, np.where(still, 0.0, 1.0 / np.where(still, 1.0, w)), still])
-        intervals = intervals_with(self.X, self.y[self.large] - w, more, found)
+    def _with(
+        self, found: DriftTestResult, id: str, text: str, more: Array, severity: str = "condition"
+    ) -> list[Reason]:
+        """Return that a verdict must hold with the columns (n, k) in the model, too."""
+        intervals = intervals_with(self.X, self.y[self.large] - self.w[self.large], more, found.coefficients)
+        return [Reason(id, text, ("pass", "fail"), severity=severity, intervals=intervals)] if intervals else []
+
+    def _unshown(self, result: DriftTestResult) -> list[Reason]:
+        """Return what the coefficients may be with what the readings hardly show: a dead band and a lock-in without
+        small rates, a shape beyond asymmetry and cubic (a warning where its F test sees it), heat of the turning.
+        """
+        w, found = self.w[self.large], list[Reason]()
+        if not self.small.rate.size:
+            still = self.sense == 0.0
+            text = (
+                "No small rates were measured, and a dead band or a lock-in that the others do not show moves e, a, c "
+                "and b. Measure small rates."
+            )
+            lock = np.where(still, 0.0, 1.0 / np.where(still, 1.0, w))
+            found += self._with(result, "threshold.unmeasured", text, np.column_stack([self.sense, lock, still]))
+        told = next((t.p for t in self.found.tests if t.id == "fifth"), None)
+        severity = "warning" if told is not None and told < SHOWN else "condition"
         text = (
-            "No small rates were measured, and a dead band or a lock-in that the others do not show moves e, a, c and "
-            "b. Measure small rates."
+            "e, a and c may hold a square or a fifth power of the rate: their intervals are wider with them. Take more "
+            "rates, or a smaller largest one."
         )
-        blocked = ("pass", "fail")
-        return [Reason("threshold.unmeasured", text, blocked, severity="condition", intervals=intervals)] * bool(
-            intervals
-        )
+        found += self._with(result, "shape.with", text, self.beyond, severity)
+        if "temperature" not in self.windows:
+            warm = heating((self.table / self.full) ** 2, self.t0, self.t1)[self.large]
+            text = (
+                "What turning heats, and what cools at small rates, changes scale factor and bias like an asymmetry or "
+                "a hysteresis. Record the temperature of the gyro."
+            )
+            found += self._with(result, "heat.with", text, np.column_stack([w[:, None] * warm, warm]))
+        return found
+
+    @property
+    def beyond(self) -> Array:
+        """Return the columns (n, 2) of a shape beyond asymmetry and cubic: square and fifth power of the rate."""
+        x = self.w[self.large] / self.full
+        return np.column_stack([x * x, x**5])
 
     def _scale_trend(self, w: Array) -> list[nuisances.Candidate]:
         """Return a scale factor that changes in time, where each sense comes once and only the shape tells it from an
@@ -208,7 +235,7 @@ class Reduction(DriftReduction[RateTableSetup]):
     def test(self, found: Findings) -> None:
         x = self.w[self.large] / self.full
         found.f_test(
-            "fifth", "square and fifth power of the rate", np.column_stack([x * x, x**5]),
+            "fifth", "square and fifth power of the rate", self.beyond,
             "shape of the scale factor", "the scale factor has a shape beyond asymmetry and cubic",
             "no shape beyond asymmetry and cubic",
         )  # fmt: skip
@@ -304,12 +331,12 @@ class Reduction(DriftReduction[RateTableSetup]):
         added = self.small.coefficient(truth)
         e, _, _, _, b = result.coefficients[:5]
         reasons = [*handling.implausible(*result.coefficients[:2]), *worded(self.setup.parameters, b.u * DPH)]
-        reasons += [*self._tail(e), *self._once(result.coefficients[3])]
+        reasons += [*self._tail(e), *self._once(result.coefficients[3]), *self._unshown(result)]
         return replace(
             result,
             coefficients=[*result.coefficients, *([added] if added else [])],
             correlation=result.correlation,
-            reasons=[*result.reasons, *reasons, *self._unmeasured(result.coefficients)],
+            reasons=[*result.reasons, *reasons],
         )
 
     def summary(self, found: Findings, coefficients: Sequence[Coefficient]) -> list[str]:

@@ -235,6 +235,30 @@ def test_mistakes_are_named(given: list[list[float]], said: str) -> None:
     assert reasons and said in reasons[0]
 
 
+def test_a_bias_shows_its_cosine_while_its_axis_goes_round_the_cone() -> None:
+    """100, 80 and -60 deg/h at 10 deg: cos = 0.98481 of that along the cone, half of 1.98481 of those across.  Against
+    the rest alone the drifts were off by -0.76, -0.61 and 0.91 deg/h, up to 200 u.  All of 100 deg/h may be
+    a g-sensitivity that leans, u is 1.52 deg/h.
+    """
+    rng, c = np.random.default_rng(3), math.cos(10.0 * DEG)
+    chain = Chain(0.01, 0.0, 0.0, True, 1)
+    f = np.repeat([0.0, 4.0, 0.0, 9.0, 0.0], 5)
+    true = {x: chain.drift(x, 10.0 * DEG, 2)[2] for x in (4.0, 9.0)}
+    rest = DPH * np.array([100.0, 80.0, -60.0])
+    moving = rest * np.array([0.5 * (1.0 + c), 0.5 * (1.0 + c), c])
+    drift = np.where(f[:, None] > 0.0, moving, rest) + 0.01 * DPH * rng.normal(size=(f.size, 3))
+    drift[:, 2] += [true.get(x, 0.0) for x in f]
+    windows = {f"drift_{a}": drift[:, k] for k, a in enumerate("xyz")}
+    t = 5.0 * np.arange(f.size)
+    windows |= {"t_start": t, "t_end": t + 4.0, "frequency": f, "half_angle": np.where(f > 0.0, 10.0 * DEG, 0.0)}
+    found = {x.name: x for x in Reduction.reduce(windows, ConingSetup(axis="z", chain=chain)).coefficients}
+    for a in "xyz":
+        for x in (4.0, 9.0):
+            d = found[f"d_{a}({x:g} Hz)"]
+            assert d.estimate == pytest.approx(true[x] / DPH if a == "z" else 0.0, abs=0.05)
+            assert d.u == pytest.approx(100.0 * (1.0 - c), rel=0.02)
+
+
 def test_records_that_say_nothing(command: Command, tmp_path: Path) -> None:
     assert "at rest" in reduced(command, tmp_path, [r for r in rows() if r[2]], 2)
     assert "no reading has a cone" in reduced(command, tmp_path, [r for r in rows() if not r[2]], 2)

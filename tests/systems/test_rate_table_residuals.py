@@ -181,3 +181,49 @@ def test_a_late_gyro_that_is_read_once_a_rate_has_a_word(tmp_path: Path, window:
     assert {r.id for r in result.reasons} & {"rate.once", "record.unsettled"} == {said}
     clean = system.reduce(system.read_measured(series(0.0, True, window, tmp_path), {}))
     assert not {r.id for r in clean.reasons} & {"rate.once", "record.unsettled"}
+
+
+def steps(folder: Path, seed: int, fifth: float = 0.0, heat: float = 0.0, tau: float = 60.0) -> Result:
+    """Two cycles of four steps to 50 deg/s, two readings of 5 s each, 0.01 deg/s of noise; a gyro whose fifth power is
+    ``fifth`` (deg/s at 50 deg/s) and whose scale factor grows by ``heat`` over 50 deg/s where the largest rate has
+    warmed it.
+    """
+    way = [12.5, 25.0, 37.5, 50.0, 37.5, 25.0, 12.5, 0.0]
+    rate = np.repeat([0.0, *[*way, *(-w for w in way)] * 2], 2)
+    x, before = rate / 50.0, 0.0
+    warm = np.empty(x.size)
+    for k, power in enumerate(x * x):
+        after = power + (before - power) * math.exp(-5.0 / tau)
+        warm[k], before = 0.5 * (before + after), after
+    mean = rate + fifth * x**5 + heat * x * warm + 0.01 * np.random.default_rng(seed).normal(size=x.size)
+    rows = [f"{5 * k},{5 * k + 5},{w:g},{y:.9g}" for k, (w, y) in enumerate(zip(rate, mean, strict=True))]
+    file = folder / "steps.csv"
+    head = ["# latitude = 0deg", "# type_b = none", "t_start [s],t_end [s],rate [deg/s],mean [deg/s]"]
+    file.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+    system = load_system(NAME)
+    return system.reduce(system.read_measured(file, {}))
+
+
+def test_a_fifth_power_that_its_test_does_not_see(tmp_path: Path) -> None:
+    """k x5 on x and x3: c = k (2.75 1.2081 - 1.7656 1.3877)/0.6989 = 1.248 k over R (sums of x2, x8, x4, x6, x =
+    1/4, 1/2, 3/4 twice and 1), 749 ppm of k = 0.03 deg/s, 5 u; what is left is 1.1146 - 1.0960 = 0.0186 k2 of eight
+    such sums, 1.3 times the variance of a reading.
+    """
+    result = steps(tmp_path, 2, fifth=0.03)
+    c = result["c"]
+    assert c.estimate == pytest.approx(749.0, abs=3.0 * c.u) and c.interval[0] > 300.0
+    (reason,) = [r for r in result.reasons if r.id == "shape.with"]
+    assert reason.severity == "condition" and reason.intervals["c"][0] < 0.0 < reason.intervals["c"][1]
+    (told,) = [r for r in steps(tmp_path, 2, fifth=0.1).reasons if r.id == "shape.with"]
+    assert told.severity == "warning"  # 15 times the variance of a reading
+
+
+def test_heat_of_the_turning_is_no_hysteresis_and_no_scale_factor(tmp_path: Path) -> None:
+    """A scale factor that lags by a minute behind the square of the rate, 0.2 % at the largest: 2000 ppm times the mean
+    of the squares, 0.34, are in e, and a rate that was reached from above is warmer.  The gyro has neither e nor h.
+    """
+    result = steps(tmp_path, 1, heat=0.1)
+    (reason,) = [r for r in result.reasons if r.id == "heat.with"]
+    for name in "eh":
+        (low, high), (wide, most) = result[name].interval, reason.intervals[name]
+        assert not low < 0.0 < high and wide < 0.0 < most
