@@ -42,6 +42,10 @@ OWN_LEVEL_RATE = Source(
     "amplitude along two level directions",
 )  # fmt: skip
 ORDERED = 0.2  # least share of a trend of a bias that the other unknowns of accelerometers leave
+SQUARES = (
+    "Accelerometers may hold squares of the specific force: their coefficients have wider intervals with them. Take "
+    "more positions, opposite ones."
+)
 WHITE = "noise of the instrument and what the model does not hold, from the residuals"
 CONVENTIONS = [
     "Axes of the case: x along the input axis of the accelerometer x, y in the plane of those of x and y, z "
@@ -102,34 +106,45 @@ class HandAccelerometers(HandChannel):
         unit = ("specific force less gravity", "µg", UG)
         return Regression(list(norms.NAMES), W @ X, W @ y, at.start, at.end, [group], *unit, "white", limit=norms.LIMIT)
 
+    @property
+    def squares(self) -> Array:
+        """Change (n, 3) of the sizes with a square of the specific force in each accelerometer."""
+        return np.asarray(self.at.up * self.at.force**2)
+
     def test(self, found: Findings) -> None:
         """Add an F test of squares, which the biases would take in part for their own."""
-        squares = self.at.up * self.at.force**2
         found.f_test(
-            "square", "squares of the accelerometers", self.data[2] @ squares, "quadratic nonlinearity",
+            "square", "squares of the accelerometers", self.data[2] @ self.squares, "quadratic nonlinearity",
             "the readings hold squares of the specific force, which the biases are off by",
             "no squares of the specific force are in the residuals",
         )  # fmt: skip
 
     def completed(self, result: DriftTestResult) -> DriftTestResult:
-        """Say where biases that change linearly in time would be taken for other unknowns: verdicts hold with them."""
+        """Say with what else verdicts must hold: squares of the specific force, which their F test need not see, and,
+        where the order of the positions hides them, biases that change linearly in time.
+        """
         at, (X, y, W) = self.at, self.data
+        counts, reasons = "a" in self.setup.counts, list[Reason]()
+
+        def wider(more: Array) -> dict[str, tuple[float, float]]:
+            return {} if counts else intervals_with(W @ X, W @ y, W @ more, result.coefficients)
+
+        if squares := wider(self.squares):
+            reasons.append(Reason("squares.with", SQUARES, BOTH, severity="condition", intervals=squares))
         time = at.start + at.end
         trends = -at.up @ at.triad.inverse * ((time - time.mean()) / np.ptp(time))[:, None]
         left = trends - X @ np.linalg.lstsq(X, trends, rcond=None)[0]
         seen = np.linalg.norm(left, axis=0) / np.linalg.norm(trends, axis=0)
-        if np.min(seen) > ORDERED:
-            return result
-        which = " and ".join(a for a, share in zip(AXES, seen, strict=True) if share <= ORDERED)
-        text = (
-            f"The order of the positions hides a bias of the accelerometer {which} that changes in time: it would be "
-            "taken for scale factor and misalignment. Take opposite directions one after the other, or repeat the "
-            "first positions at the end."
-        )
-        counts = "a" in self.setup.counts
-        intervals = {} if counts else intervals_with(W @ X, W @ y, W @ trends, result.coefficients)
-        reason = Reason("order.trend", text, BOTH if intervals else (), intervals=intervals)
-        return replace(result, reasons=[*result.reasons, reason])
+        if np.min(seen) <= ORDERED:
+            which = " and ".join(a for a, share in zip(AXES, seen, strict=True) if share <= ORDERED)
+            text = (
+                f"The order of the positions hides a bias of the accelerometer {which} that changes in time: it would "
+                "be taken for scale factor and misalignment. Take opposite directions one after the other, or repeat "
+                "the first positions at the end."
+            )
+            intervals = wider(trends)
+            reasons.append(Reason("order.trend", text, BOTH if intervals else (), intervals=intervals))
+        return replace(result, reasons=[*result.reasons, *reasons])
 
     @property
     def start(self) -> Array:

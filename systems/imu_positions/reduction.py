@@ -25,6 +25,7 @@ from gyrobench import frames
 from gyrobench.reduction.estimation import nuisances
 from gyrobench.reduction.estimation.channel_tests import ChannelTests
 from gyrobench.reduction.estimation.nuisances import BOTH
+from gyrobench.reduction.estimation.unshown_columns import intervals_with
 from gyrobench.reduction.setup.rate_gyro_bias import word_error
 from gyrobench.reduction.setup.sources import Source
 from gyrobench.reduction.toolkit import (
@@ -54,12 +55,16 @@ from .compensation import truth_of
 from .hand import UNKNOWN, HandReduction
 from .log import UP_DOWN
 from .sources import GYRO_SCALE
-from .thermal import Thermal, quantity
+from .thermal import Thermal, narrow_temperatures, quantity
 from .updown import UpDownReduction
 
 COLUMNS = ("phase", "t_start", "t_end", *geometry.ANGLES, *(f"mean_{c.name}" for c in CHANNELS))
 LEAST_SPAN = 3.0  # K, from which on a record is one over temperature
 POWERS = ("", "", "²", "³", "⁴")
+PRODUCTS = (
+    "Products of two components of the specific force, which residuals need not show, widen the intervals. Take more "
+    "positions."
+)
 COUNTS = 0.3  # of u of a bias: an error of a reading that is told
 ROUNDING = 1e-9  # of the departures of the readings, which are themselves some 1e-4 of them
 
@@ -108,8 +113,9 @@ class ImuChannel(DriftReduction[ImuSetup]):
         shown = [Group(c.words, np.arange(y.size), phase, "number of the phase", "")]
         unit = ("departure of the rate", "°/h", DPH) if c.gyro else ("departure of the specific force", "µg", UG)
         weighed = self._candidates() if s.nuisances else []
+        self.model = X, y = self.design(omega, force), y
         return Regression(
-            quantities, self.design(omega, force), y, t0, t1, shown, *unit, limit=geometry.LIMIT, candidates=weighed,
+            quantities, X, y, t0, t1, shown, *unit, limit=geometry.LIMIT, candidates=weighed,
             ideal=ROUNDING,
         )  # fmt: skip
 
@@ -182,7 +188,7 @@ class ImuChannel(DriftReduction[ImuSetup]):
             force = self.kinematics.felt[1][self.rows] / frames.G0
             found.f_test(
                 "square", "squares of the accelerometers",
-                np.column_stack([force**2, force * np.roll(force, 1, axis=1)]), "quadratic nonlinearity",
+                np.column_stack([force**2, self.products]), "quadratic nonlinearity",
                 "the readings hold squares of the specific force, which the biases are off by",
                 "no squares of the specific force are in the residuals",
             )  # fmt: skip
@@ -216,9 +222,20 @@ class ImuChannel(DriftReduction[ImuSetup]):
                 "misalignments and g-sensitivity do not follow the temperature",
             )  # fmt: skip
 
+    @property
+    def products(self) -> Array:
+        """Return the products (n, 3) of two components of the specific force, g²."""
+        force = self.kinematics.felt[1][self.rows] / frames.G0
+        return np.asarray(force * np.roll(force, 1, axis=1))
+
     def completed(self, result: DriftTestResult) -> DriftTestResult:
-        """Say where too few temperatures tell a hysteresis of the scale factor from what it does with T."""
+        """Say what the coefficients of an accelerometer may be with products of the specific force, and where too few
+        temperatures tell a hysteresis of the scale factor from what it does with T.
+        """
         c = self.channel
+        if not c.gyro and (intervals := intervals_with(*self.model, self.products, result.coefficients)):
+            reason = Reason("products.with", PRODUCTS, BOTH, severity="condition", intervals=intervals)
+            result = replace(result, reasons=[*result.reasons, reason])
         own = self.kinematics.felt[0 if c.gyro else 1][self.rows, c.axis]
         if self.thermal is None or not self.scaled or self.thermal.told(own, self.found.X):
             return result
@@ -356,8 +373,9 @@ class Reduction(ChannelTests[ImuSetup]):
         off = table_errors.reasons(
             self.each, self.setup, lambda setup, name: ImuChannel(self.windows, setup, name, self.kinematics)
         )
+        off += [*narrow_temperatures(self.windows, self.setup, found.coefficients), *self._words(found)]
         by_position = tables.by_position(self.windows, self.kinematics.motion, found)
-        return replace(found, tables=[*found.tables, by_position], reasons=[*found.reasons, *off, *self._words(found)])
+        return replace(found, tables=[*found.tables, by_position], reasons=[*found.reasons, *off])
 
     def _words(self, found: DriftTestResult) -> list[Reason]:
         """Return that words of simulated accelerometers are not dithered by their noise, as far as it counts."""

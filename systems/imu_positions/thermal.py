@@ -8,21 +8,26 @@ width that is stated.  All are means over a window in which T changes evenly.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import PchipInterpolator, make_smoothing_spline
 
 from gyrobench.arrays import Array
+from gyrobench.reduction.estimation.nuisances import BOTH
 from gyrobench.reduction.estimation.quantity import Quantity
+from gyrobench.reduction.estimation.sentences import plain
+from gyrobench.result import Coefficient, Reason
 from gyrobench.units import DPH
 
+from .budget import ImuSetup
 from .channels import UG, ImuInstrument
 
 PLACES = (np.arange(8) + 0.5) / 8.0  # of a window, at which the play is taken
 OTHER_WIDTHS = (1.0 / 3.0, 3.0)  # of the hysteresis, that a test looks for
+NARROW = 2.0  # widths of the hysteresis, that temperatures span at least
 APART = 0.1  # least share of one more power, hysteresis and rate of a scale factor, of two of them, that is left
 #: ending of a coefficient -> parameter of the parts, size of its unit over that of the bias, unit, meaning
 BIAS = {
@@ -60,15 +65,18 @@ class Thermal:
     def of(cls, windows: Mapping[str, Any], reference: float, width: float, orders: tuple[int, int]) -> Thermal:
         """Return the temperatures of windows above the reference; width (K): of the hysteresis.
 
-        Within a window the temperature changes evenly, between the ends that the means of its neighbours give it.
+        Within a window the temperature changes evenly, between the ends that the means of its neighbours give it; its
+        rate of change is that of a smoothing spline (generalized cross-validation), for a thermometer's noise,
+        differenced, is as large as that of a slow ramp, and a fit that takes drift off compares all but the slow part.
         """
         t0, t1, mean = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end", "temperature"))
         between = PchipInterpolator(0.5 * (t0 + t1), mean - reference, extrapolate=True)
+        smooth = make_smoothing_spline(0.5 * (t0 + t1), mean)
         start, end = between(t0), between(t1)
         path = start[:, None] + (end - start)[:, None] * PLACES
         first, second, third = ((path**k).mean(axis=1) for k in (1, 2, 3))
         way, *others = (_play(start, path, end, f * width) for f in (1.0, *OTHER_WIDTHS))
-        return cls((first, second, third), way, (end - start) / (t1 - t0), orders, np.column_stack(others))
+        return cls((first, second, third), way, (smooth(t1) - smooth(t0)) / (t1 - t0), orders, np.column_stack(others))
 
     def rows(self, kept: Array) -> Thermal:
         """Return the temperatures of some of the windows."""
@@ -144,3 +152,19 @@ def parameters() -> dict[str, tuple[str, str]]:
         found |= {f"{word}_{BIAS[e][0]}": (f"b{kind}{e}", u) for e, u in ends.items()}
         found |= {f"{word}_{SCALE[e][0]}": (f"S{kind}{e}", u) for e, u in (("T", "1/K"), ("T2", "1/K2"))}
     return found
+
+
+def narrow_temperatures(windows: Mapping[str, Any], setup: ImuSetup, found: Sequence[Coefficient]) -> list[Reason]:
+    """Return that the temperatures need not go through a hysteresis of another width than is stated."""
+    if not setup.thermal:
+        return []
+    span, width = float(np.ptp(windows["temperature"])), setup.thermal[2]
+    if span >= NARROW * width:
+        return []
+    text = (
+        f"The temperatures span {plain(span, 3)} K, less than twice the width of the hysteresis, {plain(width, 3)} K: "
+        "where it is a little wider no residual shows that bT and bR hold it. Take wider temperatures, or state a "
+        "narrower hysteresis that is known (hysteresis_width)."
+    )
+    names = tuple(c.name for c in found if c.name[0] == "b" and c.name.partition("_")[0][2:] in ("T", "H", "R"))
+    return [Reason("thermal.narrow", text, BOTH, names, severity="doubt")]

@@ -7,9 +7,12 @@ mean of the readings by 98 µg between them, 20 u of a bias.
 from __future__ import annotations
 
 import importlib
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from imu_world import Unit, World, plan, poses
 
 from gyrobench.bench import UsageError
 from gyrobench.engine.session import Session
@@ -20,7 +23,10 @@ from gyrobench.system.system import load_system
 NAME = "imu_positions"
 SQUARE = 2e-5
 SHORT = {"dwell": 20.0, "turns": 2}
-compensation: Any = importlib.import_module(".compensation", type(load_system(NAME)).__module__)
+room = type(load_system(NAME)).__module__
+budget: Any = importlib.import_module(".budget", room)
+compensation: Any = importlib.import_module(".compensation", room)
+reduction: Any = importlib.import_module(".reduction", room)
 
 
 def reduced(square: float, **options: Any) -> Result:
@@ -80,3 +86,43 @@ def test_a_cubic_leaves_no_true_scale_factor() -> None:
             result = system.reduce(session.run({**SHORT, "accelerometers.cubic": cubic}, seed=4))
         assert (result["Sa_xx"].truth is not None) == known
         assert result["Sa_xy"].truth is not None
+
+
+def test_products_that_the_residuals_do_not_show_are_in_wider_intervals() -> None:
+    """16 positions as they come, one reading each of 0.3 mg: 1 mg/g2 by x y in the accelerometer y puts Sa_yx 3.4 u off
+    and no test sees it.
+    """
+    rng = np.random.default_rng(14)
+    places = plan([tuple(p) for p in rng.uniform(-np.pi, np.pi, (16, 2))], rate=0.0, count=1)
+    unit, world = Unit.drawn(rng), World()
+    windows = world.windows(places, unit)
+    exact = world.windows(places, Unit(*(np.zeros(s) for s in (3, (3, 3), (3, 3), 3, (3, 3)))))
+    x, y = (exact[f"mean_a{a}"] / G0 for a in "xy")
+    windows["mean_ay"] = windows["mean_ay"] + 1e-3 * G0 * x * y + 3e-4 * G0 * rng.normal(size=x.size)
+    setup = budget.ImuSetup(latitude=world.latitude, gravity=world.gravity, earth_rate=7.2921159e-5)
+    result = reduction.Reduction(windows, setup).of_channel("ay").result()
+    assert "residuals.contradict" not in {r.id for r in result.reasons}
+    (reason,) = [r for r in result.reasons if r.id == "products.with"]
+    true = unit.Sa[1, 0] / np.pi * 648000.0
+    (low, high), (wide, most) = result["Sa_yx"].interval, reason.intervals["Sa_yx"]
+    assert not low < true < high and wide < true < most
+
+
+def test_squares_by_hand_that_no_test_sees_are_in_wider_intervals(tmp_path: Path) -> None:
+    """A square K g u_x2 of the accelerometer x makes the sizes larger by K g u_x3, of which u_x, a bias, takes the
+    mean of u_x4 over that of u_x2, 3/5 of directions all round: 400 ug/g2 are 240 ug, 4 u and more of 20 means with 100
+    ug of noise.
+    """
+    rng = np.random.default_rng(0)
+    force = 9.805 * np.array([p.inv().apply([0.0, 0.0, 1.0]) for p in poses(rng, 20)])
+    file = tmp_path / "means.csv"
+    head = "# attitudes = unknown\n# gravity = 9.805m/s2\n# type_b = none\nax [m/s2],ay [m/s2],az [m/s2]"
+    read = force + 4e-4 * force**2 / G0 + 1e-4 * G0 * rng.normal(size=force.shape)
+    np.savetxt(file, read, "%.9g", ",", header=head, comments="")
+    system = load_system(NAME)
+    result = system.reduce(system.read_measured(file, {}))
+    assert "residuals.contradict" not in {r.id for r in result.reasons}
+    (reason,) = [r for r in result.reasons if r.id == "squares.with"]
+    for a in "xyz":
+        c, (wide, most) = result[f"ba_{a}"], reason.intervals[f"ba_{a}"]
+        assert c.estimate == pytest.approx(240.0, abs=4.0 * c.u) and c.interval[0] > 0.0 and wide < 0.0 < most

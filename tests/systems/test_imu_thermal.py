@@ -27,6 +27,7 @@ reduction: Any = importlib.import_module(".reduction", room)
 geometry: Any = importlib.import_module(".geometry", room)
 budget: Any = importlib.import_module(".budget", room)
 tables: Any = importlib.import_module(".tables", room)
+thermal: Any = importlib.import_module(".thermal", room)
 compensation: Any = importlib.import_module(".compensation", room)
 DPH = math.pi / 648000.0
 CYCLE = [*plan(FACES, rate=0.0, dwell=40.0, count=2), *plan((), rate=1.0, turns=2)]
@@ -73,8 +74,9 @@ def setup(**more: Any) -> Any:
 
 @pytest.mark.long
 def test_a_world_in_plain_numpy_comes_back() -> None:
-    """No noise; what is left comes from a temperature that only the means of windows tell, 1.4 K a window at 4 K/min:
-    below 0.03 of a thermal effect at 40 K (20 deg/h, 2 mg, 500 ppm)."""
+    """No noise; what is left comes from a temperature that only the means of windows tell, 1.4 K a window at 4 K/min,
+    whose corners the spline of its rate of change rounds: below 0.1 of a thermal effect at 40 K (20 deg/h, 2 mg, 500
+    ppm)."""
     w, truth = heated(1)
     found = {c.name: c.estimate * tables.SCALES[c.unit] for c in reduction.reduce(w, setup()).coefficients}
     assert set(found) == set(truth) and len(found) == 75
@@ -83,7 +85,7 @@ def test_a_world_in_plain_numpy_comes_back() -> None:
         gyro = kind[1] == "g" or n[0] == "G"
         size = {"b": 20.0 * DPH if gyro else 2e-3 * 9.8, "S": 5e-4, "G": 20.0 * DPH}[n[0]]
         power = {"T": 40.0, "T2": 40.0**2, "T3": 40.0**3, "R": 1.0 / 30.0}.get(ending, 1.0)
-        assert abs(value - truth[n]) * power < 0.03 * size, n
+        assert abs(value - truth[n]) * power < 0.1 * size, n
 
 
 def test_a_thermometer_that_stood_still_is_named() -> None:
@@ -177,6 +179,34 @@ def test_few_temperatures_of_the_scale_factor_are_said(cycles: int, said: bool) 
     assert named == ({"thermal.few"} if said else {"residuals.contradict"})
     names = next((r.names for r in result.reasons if r.id == "thermal.few"), ())
     assert set(names) >= ({"SgT_x", "SgT2_x"} if said else set())
+
+
+def test_temperatures_that_need_not_go_through_the_hysteresis_are_said() -> None:
+    """80 K of the program times 0.2: 15 K, of which a hysteresis of 15 K makes a straight line, in bT (17 u off); where
+    2 K are stated as its width 15 K go through it.
+    """
+    w, _ = heated(20, 4, white(20))
+    w["temperature"] = 0.2 * w["temperature"]
+    for width, said in ((10.0, True), (2.0, False)):
+        result = reduction.reduce(w, setup(thermal=(3, 2, width, 0.0)))
+        names = [set(r.names) for r in result.reasons if r.id == "thermal.narrow"]
+        assert len(names) == said
+        assert not said or ({"bgT_x", "bgH_x", "baR_z"} <= names[0] and not {"bg_x", "bgT2_x", "SgT_x"} & names[0])
+
+
+def test_the_noise_of_a_thermometer_is_not_a_rate_of_change() -> None:
+    """20 mK of noise in means over 20 s: their differences over 40 s are 0.04 K/min, those over turns of 6 s more; a
+    program of 0.5 K/min and the spline through all means have it to 0.07 (it was 0.11).
+    """
+    w = World().windows(CYCLE * 7, Unit.drawn(np.random.default_rng(1)))
+    t0, t1 = w["t_start"], w["t_end"]
+    temperature = program(float(t1[-1]))
+    slope = 0.14 * (temperature(t1) - temperature(t0)) / (t1 - t0)
+    fine = t0[:, None] + (t1 - t0)[:, None] * (np.arange(40) + 0.5) / 40.0
+    noise = 0.02 * np.random.default_rng(2).normal(size=t0.size)
+    w["temperature"] = 0.14 * temperature(fine).mean(axis=1) + noise
+    found = thermal.Thermal.of(w, 0.0, 10.0, (3, 2)).slope
+    assert 60.0 * np.std(found - slope) < 0.07 and 60.0 * np.std(slope) > 0.4
 
 
 VALUES: dict[str, Any] = {
