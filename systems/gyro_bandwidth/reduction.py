@@ -44,6 +44,7 @@ FIGURES = (
 PLAIN = 1e-9  # Hz; finer than any figure
 STEPS = (1e-3, 1e-5, 1e-3, 1e-3)  # of the sources, of which the sensitivities are taken
 CLEAR, EARLY = 5.0, 0.01  # u, and of the delay, from which on a negative delay beside the poles is said
+LOOSE = 0.2  # of K or f_3dB, a standard uncertainty from which on no first order holds
 NEAR = 2.0  # steps of the frequencies from a resonance, within which a crossing rests on the model
 NOT_REACHED = "not reached up to {f} Hz, the highest frequency"
 
@@ -198,6 +199,15 @@ class Reduction(MeasureReduction):
             found.doubt("gyro.saturated", f"The gyro was beyond its range at {at}. Its gain there is too small. Take a "
                                           "smaller rate.")  # fmt: skip
         found.doubt("response.misfit", misfit(points.known, c.chi2, c.dof, self._neighbours_alike))
+        K, f3 = self.figures.value[:2]
+        loose = max(float(u / v) for u, v in zip(self.figures.u[:2], (K, f3), strict=True) if math.isfinite(v))
+        if f3 < points.f[0] or loose > LOOSE:
+            text = (
+                "The gain at low frequency is that of the curve, not of the points: K or f_3dB is known to "
+                f"{plain(100.0 * loose)} %, or lies below the lowest frequency, and intervals hold for small changes "
+                "alone. Measure lower frequencies, or with less noise."
+            )
+            found.doubt("response.loose", text)
         T, u = self._pure_delay()
         early = -T
         if self.run.measured and early > max(CLEAR * u, EARLY * float(self.figures.value[3])):

@@ -7,13 +7,12 @@ resonance of a suspension stands in the band, a pair of poles with a pair of zer
 
     [1 + (2 z + c) x + (1 - a) x2] / [1 + 2 z x + x2]
 
-Of a gyro that holds a sample for the time P the curve is times sinc(f P) exp(-s P/2), which is known and which no
-poles are.  The figures are
-those of this curve: the first frequency with |H| = K/sqrt(2), the first with arg H = -90 degrees, the delay -d arg H /
-d w at frequency zero, the order -2 d ln |H| / d ln f at -3 dB, which is n of a Butterworth low-pass of order n.
+Of a gyro that holds a sample for the time P the curve is times sinc(f P) exp(-s P/2), which is known and no pole's.
+The figures are those of this curve: the first frequencies with |H| = K/sqrt(2) and with arg H = -90 degrees, the delay
+-d arg H / d w at frequency zero, the order -2 d ln |H| / d ln f at -3 dB, n of a Butterworth low-pass of order n.
 
 The uncertainty is that of the points, widened by sqrt(chi2 / degrees of freedom) where the curve does not fit them, and
-what one pole more changes beyond what noise explains.  [TEST-BANDWIDTH; Schwarz 1978]
+what one pole more changes beyond what noise explains.  [TEST-BANDWIDTH; Schwarz 1978; MacKinnon 1985]
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize
+from scipy import optimize, special
 
 from gyrobench.arrays import Array
 
@@ -37,6 +36,7 @@ LIMIT = 60.0  # of the logarithm of a corner, rad/s
 GOOD = 2.0  # chi2 over degrees of freedom below which no other start is tried
 SEEN = 3.0  # u: what a resonance makes at a frequency that shows it
 DAMPING = (0.003, 0.01, 0.03, 0.1, 0.3)  # of a resonance that is looked for
+LEVERAGE = 0.02  # least share of a point's noise that its residual holds
 WIDE = 1e3  # of the highest frequency: slower and faster poles than this are none
 
 
@@ -247,11 +247,22 @@ def fitted(r: GyroResponse, poles: int, start: Array | None = None) -> PoleCurve
     scale = np.linalg.norm(best.jac, axis=0)
     if not np.all(scale > 0.0) or np.linalg.cond(best.jac / scale) > 1e7:
         return None
-    cov = np.linalg.inv((best.jac / scale).T @ (best.jac / scale)) / np.outer(scale, scale)
+    cov = _covariance(best.jac / scale, best.fun, r.known) / np.outer(scale, scale)
     chi2 = 2.0 * float(best.cost)
     p, cov = best.x * units, cov * np.outer(units, units)
     curve = PoleCurve(poles, p, cov, chi2, dof, _criterion(r, chi2, free), top, r.held, resonant)
     return None if resonant and not _shown(r, curve) else curve
+
+
+def _covariance(J: Array, left: Array, known: bool) -> Array:
+    """Return the covariance of parameters of slopes J (2 n, p): by u of the points, or by what each leaves (2 n,) of a
+    fit without it (HC3), as where the noise of each is not known.
+    """
+    inverse = np.linalg.inv(J.T @ J)
+    gain = inverse @ J.T
+    own = (left / np.maximum(1.0 - np.sum(J.T * gain, axis=0), LEVERAGE)) ** 2
+    both = np.tile(np.mean(own.reshape(2, -1), axis=0), 2)  # gain and phase of a point are alike
+    return np.asarray(inverse if known else (gain * both) @ gain.T)
 
 
 def _criterion(r: GyroResponse, chi2: float, free: int) -> float:
@@ -351,8 +362,23 @@ def curves(r: GyroResponse) -> list[PoleCurve]:
         curve = fitted(r, poles) if poles <= best + 2 else None
         found += [curve] if curve is not None else []
     least = min((c.criterion for c in found), default=0.0)
-    resonant = [_with_resonance(r, c, least) for c in found]
-    return [*found, *(c for c in resonant if c is not None)]
+    resonant = [c for c in (_with_resonance(r, c, least) for c in found) if c is not None]
+    widest = min(resonant, key=lambda c: c.criterion, default=None)
+    while widest and (more := _one_more(r, widest)):  # one pole more beside it, until it is no better
+        resonant.append(more)
+        widest = more if more.criterion < widest.criterion else None
+    return [*found, *resonant]
+
+
+def _one_more(r: GyroResponse, c: PoleCurve) -> PoleCurve | None:
+    """Return a curve with a resonance with one pole more, from one three times above the frequencies on."""
+    rest, far = c.p[2:-4], math.log(6.0 * math.pi * float(r.f[-1]))
+    if rest.size % 2:  # two single poles are a pair
+        half = 0.5 * (far - rest[-1])
+        rest = np.array([*rest[:-1], rest[-1] + half, math.log(math.cosh(half))])
+    else:
+        rest = np.append(rest, far)
+    return fitted(r, c.poles + 1, np.array([*c.p[:2], *rest, *c.p[-4:]])) if c.poles < POLES else None
 
 
 def figures(r: GyroResponse, choose: Callable[[list[PoleCurve]], PoleCurve] | None = None) -> Figures | None:
@@ -370,4 +396,5 @@ def figures(r: GyroResponse, choose: Callable[[list[PoleCurve]], PoleCurve] | No
         shape = np.sqrt(np.maximum(np.nan_to_num(beyond), 0.0))
     if best.shape == (1, False):  # whose order is 1 whatever its corner
         shape[4] = math.hypot(shape[4], _next_pole(r, best, float(value[1])))
-    return Figures(value, np.sqrt(variance), shape, best)
+    student = 1.0 if r.known else float(special.stdtrit(best.dof, 0.975) / special.ndtri(0.975))
+    return Figures(value, student * np.sqrt(variance), shape, best)
