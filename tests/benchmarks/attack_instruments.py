@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 from asked import asked
-from attack_records import Written, shaken, shaken_one_way, warming
+from attack_records import Written, shaken, shaken_one_way, stepped, warming
 from attack_units import chamber, sculling
 
 import gyrobench as gb
@@ -35,6 +35,7 @@ SERIOUS = ("error", "warning", "doubt")
 EVERYWHERE = ("noise.unbounded", "turned.once")  # of any short record; of any that is turned over once
 OFF, MANY = 3.0, 4.0  # u; of one of 75 coefficients
 WRITERS: dict[str, tuple[str, Callable[[np.random.Generator, str], Written]]] = {
+    "rate table": ("rate_table_test", stepped),
     "vibration": ("vibration_rectification", shaken),
     "one way": ("vibration_rectification", shaken_one_way),
     "imu_thermal": ("imu_positions", chamber),
@@ -44,6 +45,7 @@ WRITERS: dict[str, tuple[str, Callable[[np.random.Generator, str], Written]]] = 
 ANY = ("", "coloured", "drift", "period", "jump", "coarse", "clipped", "frozen", "swapped")
 SHAKEN = (*ANY, "linear", "heat", "heat seen", "peak")
 FAULTS = {
+    "rate table": (*(f for f in ANY if f not in ("frozen", "swapped")), "square", "fifth", "heat", "dead band"),
     "vibration": (*SHAKEN, "turned jump", "leans", "heading", "not turned", "ways exchanged", "gravity"),
     "one way": SHAKEN,
     "imu_thermal": (*ANY, "late", "gain", "own heat", "width", "fourth", "axes", "steps", "leans", "gravity",

@@ -1,4 +1,4 @@
-"""Records of vibrated and warming instruments from the equations, in plain numpy, and what spoils them.
+"""Records of turned, vibrated and warming instruments from the equations, in plain numpy, and what spoils them.
 
 A fault changes the physics or the laboratory, not the columns, where that is possible; its size is by chance, of one
 noise of a reading to a hundred.  Units: those of the columns; truth in those of the report.
@@ -61,6 +61,36 @@ def thermometer(rng: Rng, fault: str, T: Array, other: Array) -> Array:
     """What is read of a temperature T; swapped: another channel was."""
     read = {"frozen": np.full(T.size, T[0]), "swapped": other}.get(fault, T)
     return read + 0.02 * rng.normal(size=T.size)
+
+
+# ------------------------------------------------------------------------------------------------ rate table
+def stepped(rng: Rng, fault: str) -> Written:
+    """rate = w + b + e w + a abs(w)/2 + c w (w/R)2 + h d, deg/s, rates in even, geometric or any steps."""
+    R, n, cycles, each = chance(rng, 10.0, 1000.0), int(rng.integers(3, 13)), int(rng.integers(1, 5)), 2
+    up = R * np.sort(np.append([rng.uniform(0.1, 0.95, n - 1), np.geomspace(0.05, 1.0, n)[:-1]][rng.integers(2)], 1.0))
+    way = [*up, *up[-2::-1], 0.0]
+    table = np.array([0.0, *([*way, *(-w for w in way)] * cycles)])
+    latitude, noise = rng.uniform(-80.0, 80.0), R * chance(rng, 1e-7, 1e-4)
+    earth = EARTH / 3600.0 * math.sin(math.radians(latitude))
+    e, a, c = rng.normal() * 1e-3, *(noise / R * chance(rng, 1.0, 300.0) * rng.choice([-1.0, 1.0], 2))
+    h, b, length = noise * chance(rng, 0.1, 100.0), 1e-3 * R * rng.normal(), chance(rng, 1.0, 20.0)
+    size, tau = noise * chance(rng, 1.0, 300.0), chance(rng, 30.0, 2000.0)
+    d = np.repeat(np.sign(np.diff(table, prepend=table[0])), each)
+    rate = np.repeat(table, each)
+    t = 1.5 * length * np.arange(rate.size)
+    w, warm, x = rate + earth, np.zeros(rate.size), rate / R
+    for k in range(1, rate.size):
+        warm[k] = x[k] ** 2 + (warm[k - 1] - x[k] ** 2) * math.exp(-1.5 * length / tau)
+    y = w + b + e * w + a * np.abs(w) / 2.0 + c * w * (w / R) ** 2 + h * d
+    y += size * {"square": x**2, "fifth": x**5, "heat": x * warm}.get(fault, 0.0 * x)
+    if fault == "dead band":
+        y -= size * np.sign(w)
+    y = spoiled(rng, fault, t, y + noise * rng.normal(size=y.size), noise)
+    columns = {"t_start [s]": t, "t_end [s]": t + length, "rate [deg/s]": rate, "mean [deg/s]": y}
+    truth = {"e": 1e6 * e, "a": 1e6 * a, "c": 1e6 * c, "h": 3600.0 * h, "b": 3600.0 * b}
+    if fault in ("drift", "jump", "period"):
+        del truth["b"]  # there is not one
+    return Written(f"# latitude = {latitude:.9g}deg\n", columns, {n: float(v) for n, v in truth.items()})
 
 
 # ------------------------------------------------------------------------------------------------ shaker
