@@ -374,7 +374,7 @@ def _one_more(r: GyroResponse, c: PoleCurve) -> PoleCurve | None:
     """Return a curve with a resonance with one pole more, from one three times above the frequencies on."""
     rest, far = c.p[2:-4], math.log(6.0 * math.pi * float(r.f[-1]))
     if rest.size % 2:  # two single poles are a pair
-        half = 0.5 * (far - rest[-1])
+        half = float(np.clip(0.5 * (far - rest[-1]), -LIMIT, LIMIT))
         rest = np.array([*rest[:-1], rest[-1] + half, math.log(math.cosh(half))])
     else:
         rest = np.append(rest, far)
