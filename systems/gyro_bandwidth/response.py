@@ -180,7 +180,7 @@ class PoleCurve:
     @property
     def resonance(self) -> float:
         """Frequency of the resonance, Hz."""
-        return math.exp(self.p[-4]) / (2.0 * math.pi) if self.resonant else math.nan
+        return math.exp(min(self.p[-4], LIMIT)) / (2.0 * math.pi) if self.resonant else math.nan
 
     def at(self, f: Array, p: Array | None = None) -> Array:
         """Return ln |H| and arg H, rows (2, n), of other parameters where they are given."""
