@@ -145,7 +145,7 @@ def read_off(of: Logarithm, highest: float) -> Array:
     if math.isfinite(f3):
         near = of(f3 * np.array([1.0 - 1e-4, 1.0 + 1e-4]))[0]
         order = -2.0 * float(near[1] - near[0]) / 2e-4
-    return np.array([math.exp(at_zero[0]), f3, f90, -at_zero[1] / (2.0 * math.pi * tiny), order])
+    return np.array([math.exp(min(at_zero[0], LIMIT)), f3, f90, -at_zero[1] / (2.0 * math.pi * tiny), order])
 
 
 def _crossing(of: Logarithm, row: int, grid: Array, y: Array, level: float) -> float:
