@@ -31,6 +31,7 @@ WORDS = {
     "BSD-3",
     "IMU-TK",
     "LN-100",
+    "VN-100",
     "NO-BREAK",
     "SIM-1",
     "RIG-7",

@@ -114,7 +114,7 @@ class FileColumn:
 
     @property
     def counts(self) -> bool:
-        """Whether it numbers the rows, by its name."""
+        """Return whether it numbers the rows, by its name."""
         return bool(re.fullmatch(COUNTER, _plain(self.name)))
 
     @property

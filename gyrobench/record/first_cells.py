@@ -1,4 +1,4 @@
-"""What the first cells of a column tell of it: its level, whether it rises, times since 1970, units of whole times."""
+"""Tell what the first cells of a column are: its level, whether it rises, times since 1970, units of whole times."""
 
 from __future__ import annotations
 

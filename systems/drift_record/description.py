@@ -231,7 +231,8 @@ def warnings(p: Prepared, run: RunDocument) -> list[Reason]:
     noise = p.noise
     if not noise.agrees:
         look = "See the figures; look for lines that wander, steps, or noise that changes with time."
-        look = MORE_DIGITS if noise.rounded_away else "Reduce the parts at rest one by one." if noise.restless else look
+        look = "Reduce the parts at rest one by one." if noise.treatment.restless else look
+        look = MORE_DIGITS if noise.rounded_away else look
         look = "Take the record as it was sampled." if noise.slower else look
         say("misfit", f"{noise_tables.agreement_text(noise)} No coefficient is stated. {look}")
     found = {"wild": noise_tables.wild_text(noise, p.time, p.units),

@@ -64,14 +64,15 @@ def _disagreement(noise: NoiseModel) -> str:
             f"the changes between rows vanish and come back after {number(noise.slower)} rows, values of a slower "
             "record that were held or interpolated"
         )
-    if noise.restless:
+    t = noise.treatment
+    if t.restless:
         return (
-            f"in {_percent(noise.restless)} of the record the readings move by {TIMES:g} times the noise of the rest, "
+            f"in {_percent(t.restless)} of the record the readings move by {TIMES:g} times the noise of the rest, "
             "or turn by 10 °/s, and more: the instrument was not at rest, or its noise is not one"
         )
     if noise.rounded_away:
         return (
-            f"{_percent(noise.alike)} of the samples are the same as the one before: the noise is below the step of "
+            f"{_percent(t.alike)} of the samples are the same as the one before: the noise is below the step of "
             "the values, and where they change tells where the step is"
         )
     a = min(noise.agreements, key=lambda a: a.share)

@@ -97,7 +97,7 @@ def fit_noise(
 
     means: a sample is the mean over tau0 (a difference of angles), not the rate at an instant.  raw: the record before
     anything was taken out of it, whose deviation the model is held against; the rate itself unless given.  alike,
-    restless: what is known of the record beside the samples, see :class:`NoiseModel`.
+    restless: what is known of the record beside the samples, see :class:`Treated`.
     Raises SeriesError for a record that is too short or constant, ValueError for tau0 that is not positive.
     """
     if not tau0 > 0.0:
@@ -121,12 +121,10 @@ def fit_noise(
         coefficients={name: times(e, scale.units[name]) for name, e in of.items()},
         processes=tuple(process(i, at, clouds, scale) for i in range(at.model.count(GM))),
         minimum=_minimum(at, found, clouds, ramp, treated.samples, scale),
-        treatment=treated,
+        treatment=replace(treated, alike=alike, restless=restless),
         agreements=(whole.scaled(scale.size, tau0), clean.scaled(scale.size, tau0)),
         with_wild={n: v * scale.units[n] for n, v in _with_wild(treated, at, found, means).items()},
         models=len(found.seen),
-        alike=alike,
-        restless=restless,
         chances={"filtered": filter_probability(clouds), "steep": steep_fall(found, at), "weak": weak_start(found, at)},
     )
 

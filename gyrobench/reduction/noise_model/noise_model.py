@@ -98,8 +98,7 @@ class NoiseModel:
     parameters in units of ``scale``, as the treatment is.  agreements: with the record as it was, and without what was
     taken out.  with_wild: coefficients with the wild samples left in.  models: how many were compared.
     chances: filtered, that the white noise has passed a filter; steep, of so steep a fall of the slow drift, weak, of
-    so little of the slowest noise by chance, see :mod:`gyrobench.reduction.noise_model.one_curve`.  alike: share of the
-    samples that are as they were read and equal the one before.  restless: share of the record that is none at rest.
+    so little of the slowest noise by chance, see :mod:`gyrobench.reduction.noise_model.one_curve`.
     """
 
     scale: Scale
@@ -112,8 +111,6 @@ class NoiseModel:
     with_wild: dict[str, float]
     models: int
     chances: dict[str, float]
-    alike: float
-    restless: float
 
     def __getitem__(self, name: str) -> Estimate:
         """Return a coefficient."""
@@ -142,12 +139,12 @@ class NoiseModel:
         stands for missing and wild samples came to an end, no rows are those of a slower record, the noise is more than
         a rare change between two values, and it was at rest.
         """
-        settled = self.treatment.settled and not (self.slower or self.rounded_away or self.restless)
+        settled = self.treatment.settled and not (self.slower or self.rounded_away or self.treatment.restless)
         return settled and all(a.holds for a in self.agreements)
 
     @property
     def rounded_away(self) -> bool:
-        return self.alike > ALIKE
+        return self.treatment.alike > ALIKE
 
     @cached_property
     def over_time(self) -> tuple[TermOverTime, ...]:

@@ -64,7 +64,8 @@ class Treated:
     spread: variance of the mean square of the noise over that of even normal noise, 1 where the level is even; levels
     (k,): rms of the noise in parts of the record, over that of all; p_level: probability of so large a difference of
     them; rounding: variance of what the step of the output makes, 0 where it has none.
-    jumps: whether the level steps too often for steps to be taken out.
+    jumps: whether the level steps too often for steps to be taken out.  alike: share of the samples that are as they
+    were read and equal the one before.  restless: share of the record that is none at rest.
     """
 
     samples: int
@@ -77,6 +78,8 @@ class Treated:
     find_wild: bool
     rounding: float = 0.0
     jumps: bool = False
+    alike: float = 0.0
+    restless: float = 0.0
 
     def without(self, changes: Sequence[Placed]) -> Treated:
         """Return the record with changes of the level taken out and their stretches completed anew.
