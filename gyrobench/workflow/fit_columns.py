@@ -34,17 +34,16 @@ from gyrobench.workflow.empty_record import empty_record
 from gyrobench.workflow.inputs import load_test
 
 HEAD = 4096  # characters of a file that may state where it was recorded
-PLACE = re.compile(r"^#\s*(latitude|gravity)\s*=", re.MULTILINE)
 OPTIONAL = ("std", "n", "flagged")
 COUNTED = "counts"  # unit of readings that are whole numbers
 COUNTS = "counts"  # option, of columns that are called as the angle or velocity of each sample
 FOUND = (COUNTS, "attitudes")  # what the columns tell
 KINDS = ("rad/s", "rad", "m/s2", "K")  # of the columns of a drift record, which has any names
 BESIDE = ("s", "ms", "us", "ns", "K", "degC")  # units of what stands beside rates and forces
-#: what columns without a unit are called -> unit that may be meant
 # what belongs to a rate or force and is none
 OTHER = r"(?!.*(time|stamp|_dt\b|count|clip|covariance|_id\b|status|valid|accuracy|norm|temp|quat))"
 TURN = r"(theta|th|ang\w*|rot\w*|phi)"
+#: what columns without a unit are called -> unit that may be meant
 LIKELY = {
     OTHER + rf"(.*delta|.*incr\w*|d)_?{TURN}(_?[xyz])?": "rad",
     OTHER + r"(.*delta|.*incr\w*|d)_?v(el\w*)?(_?[xyz])?": "m/s",
@@ -104,15 +103,19 @@ class ColumnProposal:
             entry = f"[columns.{name}] with from = {source}{unit}"
             none = f"column '{name}': none of the file fits by name and unit"
             problems.append(f"{none}; write {entry}; not used so far: {unused}")
-        if "attitudes" in self.stated and not PLACE.search(_head(self.text_file)):
-            alone = "" if any(n[0] == "g" for n in self.wanted) else ", or the gravity there"
+        gyros = any(n[0] == "g" for n in self.wanted)
+        places = {"latitude"} if gyros else {"latitude", "gravity"}
+        if "attitudes" in self.stated and not places & _stated(self.text_file).keys():
+            alone = "" if gyros else ", or the gravity there"
             problems.append(f'latitude of the place{alone}: write latitude = "45.75deg" below [set]')
         return text, problems
 
 
-def _head(file: Path) -> str:
+def _stated(file: Path) -> dict[str, str]:
+    """Return what the comments at the beginning of a file state."""
     with file.open(encoding="latin-1") as text:
-        return text.read(HEAD)
+        lines = text.read(HEAD).splitlines()
+    return values_of(s for line in lines if (s := statement(line, 1)))
 
 
 def propose_columns(file: Path, system: str) -> ColumnProposal:

@@ -272,7 +272,7 @@ def pulses_text(noise: NoiseModel, time: Array, units: ChannelUnits) -> str:
     longest = number(max(length for _, length, _, _ in each))
     return (
         f"Pulses of {said}, within {longest} s, which no noise of the rest makes, are taken out before the model; left "
-        f"in, N takes them for its random walk. Look for what touched the instrument."
+        "in, N takes them for its random walk. Look for what touched the instrument."
     )
 
 

@@ -70,8 +70,9 @@ class Thermal:
         differenced, is as large as that of a slow ramp, and a fit that takes drift off compares all but the slow part.
         """
         t0, t1, mean = (np.asarray(windows[n], dtype=float) for n in ("t_start", "t_end", "temperature"))
-        between = PchipInterpolator(0.5 * (t0 + t1), mean - reference, extrapolate=True)
-        smooth = make_smoothing_spline(0.5 * (t0 + t1), mean)
+        middle = 0.5 * (t0 + t1)
+        between = PchipInterpolator(middle, mean - reference, extrapolate=True)
+        smooth = PchipInterpolator(middle, make_smoothing_spline(middle, mean)(middle), extrapolate=True)
         start, end = between(t0), between(t1)
         path = start[:, None] + (end - start)[:, None] * PLACES
         first, second, third = ((path**k).mean(axis=1) for k in (1, 2, 3))

@@ -363,7 +363,7 @@ def test_a_late_sample_and_a_table_that_falls_off_are_said(tmp_path: Path) -> No
     late = rows - np.outer(rows[:, 0], [0.0, 0.0, 0.0, 0.36])
     result = measured(tmp_path, late, "# type_b = none")
     assert found(result)["delay"].estimate == pytest.approx(5.50, abs=0.02)
-    assert any(text.startswith("1 ms of the delay (u = 0.000") for text in result.conventions)
+    assert any(text.startswith("1 ms of the delay (u = 0.0004") for text in result.conventions)
     (asked,) = (r.text for r in result.reasons if r.id == "arrangement.unstated")
     assert "a reading late by 1 ms (a sample too much) (f_90 by" in asked
     assert "an amplitude wrong by 2 % at the highest frequency (" in asked

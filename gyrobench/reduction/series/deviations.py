@@ -41,8 +41,8 @@ class Deviation:
     """One deviation over tau, each array (k,): tau in s, the others in the unit of the rate.
 
     low, high: interval of 95 %; edf: equivalent degrees of freedom; count: differences from every sample on (of long
-    tau from every stride-th, which stand for all); exponent: alpha of
-    the power law S ~ f^alpha that the edf are for (0 white rate, -1 flicker, -2 random walk, 2 white angle).
+    tau from every stride-th, which stand for all); exponent: alpha of the power law S ~ f^alpha that the edf are for
+    (0 white rate, -1 flicker, -2 random walk, 2 white angle).
     """
 
     kind: str
